@@ -177,7 +177,10 @@ DistributedResult run_distributed(const WorldScene& scene, const DistributedSett
 struct SimulatedProcessors {
     int count = 1;
     double latency_s = 2e-4;  ///< from worker to worker
-    double slowdown = 1;      ///< simulated seconds per second of this thread's processor time
+    double by_application_s = 0,
+           directly_s =
+               0;  ///< so much longer: what the application sends, or passes on; what workers tell directly
+    double slowdown = 1;  ///< simulated seconds per second of this thread's processor time
     bool modelled =
         false;  ///< costs are counted (World::work), not measured: results are a pure function of the input
     double seconds_per_work = 2e-6;  ///< modelled: of one unit of work

@@ -361,6 +361,7 @@ public:
         const noexcept;  ///< points between own bodies and ghosts in the last step
     /// Radius of a ball that holds the body as deformed as it may be [m].
     [[nodiscard]] double most_radius(int body) const;
+    [[nodiscard]] double radius_now(int body) const;  ///< likewise as it is deformed now [m]
     /// A body's share of the last step's work, in units of an own body without contacts.
     [[nodiscard]] double work(int body) const;
 

@@ -89,6 +89,7 @@ public:
         return value == 1;
     }
     [[nodiscard]] std::size_t left() const noexcept { return bytes_.size(); }
+    [[nodiscard]] std::span<const std::uint8_t> rest() const noexcept { return bytes_; }
     void expect_end() const {
         if (!bytes_.empty()) throw DecodeError(std::to_string(bytes_.size()) + " bytes too many");
     }

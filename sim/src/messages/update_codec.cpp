@@ -14,7 +14,8 @@ namespace sim {
 namespace {
 
 constexpr std::uint8_t kUpdateAsleep = 1, kUpdateStill = 2, kUpdateQuarantined = 4, kUpdateHeld = 8;
-constexpr std::size_t kSmallestUpdate = 36, kCrossed = 45, kUsualUpdate = 120;
+constexpr std::size_t kSmallestUpdate = 36, kCrossed = 33, kUsualUpdate = 98;
+constexpr std::uint32_t kBlow = 1U << 31;
 constexpr std::int16_t kUpdateBroken = std::numeric_limits<std::int16_t>::min();
 
 /// Room for one update: what ByteWriter does, without growing by each number.
@@ -32,7 +33,7 @@ public:
     [[nodiscard]] std::span<const std::uint8_t> bytes() const { return {bytes_.data(), size_}; }
 
 private:
-    std::array<std::uint8_t, kSmallestUpdate + 12 + 6 * kMostModes> bytes_;
+    std::array<std::uint8_t, kSmallestUpdate + 14 + 4 * kMostModes> bytes_;
     std::size_t size_ = 0;
 };
 
@@ -77,6 +78,43 @@ void write_halves(SmallWriter& out, const Vector& v, bool zeros = false) {
 template <typename Vector>
 void read_halves(SmallReader& in, Vector& v) {
     for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = read_half(in);
+}
+
+// Small numbers of one kind: bytes, and the power of two by which they count: the least with which none is beyond 127.
+
+std::size_t bytes_of_small(std::size_t numbers) {
+    return numbers > 0 ? 1 + numbers : 0;
+}
+
+void write_small(SmallWriter& out, const Eigen::VectorXd& v, Eigen::Index n, bool zeros = false) {
+    if (n == 0) return;
+    const auto at = [&](Eigen::Index i) { return zeros || i >= v.size() || std::isnan(v[i]) ? 0.0 : v[i]; };
+    double most = 0;
+    for (Eigen::Index i = 0; i < n; ++i) most = std::max(most, std::abs(at(i)));
+    int exponent = -128;
+    if (most > 0) {
+        (void)std::frexp(most, &exponent);  // most in [2^(exponent - 1), 2^exponent)
+        exponent -= 7;
+        if (most > std::ldexp(127.0, exponent)) ++exponent;
+    }
+    exponent = std::clamp(exponent, -128, 127);
+    out.number(static_cast<std::int8_t>(exponent));
+    for (Eigen::Index i = 0; i < n; ++i)
+        out.number(
+            static_cast<std::int8_t>(std::clamp(std::rint(std::ldexp(at(i), -exponent)), -127.0, 127.0)));
+}
+
+void read_small(SmallReader& in, Eigen::VectorXd& v) {
+    if (v.size() == 0) return;
+    const double unit = std::ldexp(1.0, in.number<std::int8_t>());
+    int most = 0;
+    for (double& x : v) {
+        const int number = in.number<std::int8_t>();
+        most = std::max(most, std::abs(number));
+        x = unit * number;
+    }
+    const bool least = most >= 64 || unit == std::ldexp(1.0, -128);
+    if (most > 127 || !least) throw DecodeError("numbers that are not as small as they can be");
 }
 
 // Floats of a place or an impulse.
@@ -190,12 +228,11 @@ void write(ByteWriter& all, const Update& u) {
     write_halves(out, s.velocity, broken);
     for (const std::int16_t m : angular.mantissas) out.number(m);
     write_halves(out, s.q, broken);
-    write_halves(out, s.q_dot, broken);
+    write_small(out, s.q_dot, s.q.size(), broken);
     if (held) {
         write_halves(out, u.impulse.linear);
         write_halves(out, u.impulse.angular);
-        for (Eigen::Index i = 0; i < s.q.size(); ++i)
-            write_half(out, i < u.impulse.modal.size() ? u.impulse.modal[i] : 0);
+        write_small(out, u.impulse.modal, s.q.size());
     }
     all.append(out.bytes());
 }
@@ -205,8 +242,8 @@ void read_update(ByteReader& all, Update& u) {
     u.body = which.body;
     const auto flags = all.number<std::uint8_t>();
     const auto modes = static_cast<std::size_t>(which.modes);
-    const std::size_t head = 5, held = flags & kUpdateHeld ? 12 + 2 * modes : 0;
-    SmallReader in(all.take(kSmallestUpdate - head + 4 * modes + held));
+    const std::size_t head = 5, small = bytes_of_small(modes), held = flags & kUpdateHeld ? 12 + small : 0;
+    SmallReader in(all.take(kSmallestUpdate - head + 2 * modes + small + held));
     u.asleep = flags & kUpdateAsleep, u.still = flags & kUpdateStill,
     u.quarantined = flags & kUpdateQuarantined;
     u.held = flags & kUpdateHeld;
@@ -217,7 +254,7 @@ void read_update(ByteReader& all, Update& u) {
     const bool whole = read_angular(in, flags >> 4, s.angular_momentum);
     s.q.resize(which.modes), s.q_dot.resize(which.modes);
     read_halves(in, s.q);
-    read_halves(in, s.q_dot);
+    read_small(in, s.q_dot);
     if (is_broken(s)) throw DecodeError("an update out of range");
     if (!whole) s.position.setConstant(std::numeric_limits<double>::quiet_NaN());
     u.impulse.modal.resize(which.modes);
@@ -227,13 +264,7 @@ void read_update(ByteReader& all, Update& u) {
     }
     read_halves(in, u.impulse.linear);
     read_halves(in, u.impulse.angular);
-    read_halves(in, u.impulse.modal);
-}
-
-int read_body_number(SmallReader& in) {
-    const auto body = in.number<std::uint32_t>();
-    if (body >= kMostWorldBodies) throw DecodeError("a body's number beyond the largest");
-    return static_cast<int>(body);
+    read_small(in, u.impulse.modal);
 }
 
 }  // namespace
@@ -244,16 +275,22 @@ void write(ByteWriter& out, const std::vector<Update>& updates) {
     for (const Update& u : updates) write(out, u);
 }
 
+Eigen::Vector3d angular_as_sent(const Eigen::Vector3d& v) {
+    const SharedExponent s = quantised(v);
+    return unit_of(s.exponent) * Eigen::Vector3d(s.mantissas[0], s.mantissas[1], s.mantissas[2]);
+}
+
 void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed) {
     out.count(crossed.size());
     out.bytes().reserve(out.bytes().size() + crossed.size() * kCrossed);
     for (const CrossImpulse& c : crossed) {
-        out.number(static_cast<std::uint32_t>(c.own));
+        const SharedExponent own = quantised(c.angular_own), ghost = quantised(c.angular_ghost);
+        out.number(static_cast<std::uint32_t>(c.own) | (c.blow ? kBlow : 0));
         out.number(static_cast<std::uint32_t>(c.ghost));
-        out.number(static_cast<std::uint8_t>(c.blow));
+        out.number(static_cast<std::uint8_t>(own.exponent | ghost.exponent << 4));
         write_floats(out, c.linear);
-        write_floats(out, c.angular_own);
-        write_floats(out, c.angular_ghost);
+        for (const SharedExponent& s : {own, ghost})
+            for (const std::int16_t m : s.mantissas) out.number(m);
     }
 }
 
@@ -266,45 +303,64 @@ std::vector<CrossImpulse> read_crossed(ByteReader& all) {
     std::vector<CrossImpulse> crossed(all.count(kCrossed));
     SmallReader in(all.take(kCrossed * crossed.size()));
     for (CrossImpulse& c : crossed) {
-        c.own = read_body_number(in), c.ghost = read_body_number(in);
-        const auto blow = in.number<std::uint8_t>();
-        if (blow > 1 || c.own == c.ghost) throw DecodeError("an impulse between bodies that is none");
-        c.blow = blow == 1;
+        const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(), body = own & ~kBlow;
+        const auto exponents = in.number<std::uint8_t>();
+        if (body >= kMostWorldBodies || ghost >= kMostWorldBodies || body == ghost)
+            throw DecodeError("an impulse between bodies that is none");
+        c.own = static_cast<int>(body), c.ghost = static_cast<int>(ghost), c.blow = (own & kBlow) != 0;
         read_floats(in, c.linear);
-        read_floats(in, c.angular_own);
-        read_floats(in, c.angular_ghost);
+        const bool whole = read_angular(in, exponents & 15, c.angular_own) &&
+                           read_angular(in, exponents >> 4, c.angular_ghost);
+        if (!whole) throw DecodeError("an impulse that is broken");
     }
     return crossed;
 }
 
-// Steps over them; each has its own length.
-void find_updates(ByteReader& in, std::span<const std::uint8_t> all,
-                  std::vector<PackedUpdates::Place>& places) {
-    places.resize(in.count(kSmallestUpdate));
-    for (PackedUpdates::Place& place : places) {
-        place.offset = static_cast<std::uint32_t>(all.size() - in.left());
-        const BodyAndModes which = read_body_and_modes(in);
-        place.body = which.body;
-        const auto modes = static_cast<std::size_t>(which.modes);
-        const bool held = in.number<std::uint8_t>() & kUpdateHeld;
-        (void)in.take(kSmallestUpdate - 5 + 4 * modes + (held ? 12 + 2 * modes : 0));
+namespace {
+
+PackedUpdates::Place place_of(const Update& update, std::size_t offset) {
+    const WorldBodyState& s = update.state;
+    return {update.body,        static_cast<std::uint32_t>(offset),
+            s.q.size(),         update.asleep,
+            update.quarantined, s.position,
+            s.velocity};
+}
+
+}  // namespace
+
+void PackedUpdates::add(const Update& update) {
+    ByteWriter out;
+    std::swap(out.bytes(), bytes_);
+    places_.push_back(place_of(update, out.bytes().size()));
+    write(out, update);
+    std::swap(out.bytes(), bytes_);
+}
+
+void PackedUpdates::add(const PackedUpdates& from, const Place& place) {
+    const auto next = std::ranges::upper_bound(from.places_, place.offset, {}, &Place::offset);
+    const std::size_t end = next == from.places_.end() ? from.bytes_.size() : next->offset;
+    places_.push_back(place);
+    places_.back().offset = static_cast<std::uint32_t>(bytes_.size());
+    bytes_.insert(bytes_.end(), from.bytes_.begin() + place.offset,
+                  from.bytes_.begin() + static_cast<std::ptrdiff_t>(end));
+}
+
+void PackedUpdates::read(ByteReader& in) {
+    places_.resize(in.count(kSmallestUpdate));
+    const std::span<const std::uint8_t> all = in.rest();
+    thread_local Update update;
+    for (Place& place : places_) {
+        const std::size_t offset = all.size() - in.left();
+        read_update(in, update);
+        place = place_of(update, offset);
     }
+    const auto used = all.first(all.size() - in.left());
+    bytes_.assign(used.begin(), used.end());
 }
 
-void PackedUpdates::update(std::uint32_t offset, Update& into) const {
-    ByteReader in(std::span<const std::uint8_t>(bytes).subspan(offset));
+void PackedUpdates::read(const Place& place, Update& into) const {
+    ByteReader in(std::span<const std::uint8_t>(bytes_).subspan(place.offset));
     read_update(in, into);
-}
-
-PackedUpdates::Glance PackedUpdates::glance(std::uint32_t offset) const {
-    SmallReader in(std::span<const std::uint8_t>(bytes).subspan(offset + 4));
-    Glance glance;
-    const auto flags = in.number<std::uint8_t>();
-    glance.asleep = flags & kUpdateAsleep, glance.quarantined = flags & kUpdateQuarantined;
-    read_floats(in, glance.position);
-    (void)in.take(7);
-    read_halves(in, glance.velocity);
-    return glance;
 }
 
 }  // namespace sim

@@ -28,8 +28,7 @@ void read_updates(ByteReader& in, std::vector<Update>& updates);
     return {of(v.x()), of(v.y()), of(v.z())};
 }
 
-/// Where the updates are in a message's bytes; lengths are checked, the rest when they are read.
-void find_updates(ByteReader& in, std::span<const std::uint8_t> all,
-                  std::vector<PackedUpdates::Place>& places);
+/// Of an angular impulse.
+[[nodiscard]] Eigen::Vector3d angular_as_sent(const Eigen::Vector3d& v);
 
 }  // namespace sim

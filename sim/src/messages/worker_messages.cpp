@@ -1,5 +1,6 @@
 #include "messages/worker_messages.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -13,9 +14,10 @@ namespace sim {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
-constexpr std::uint16_t kUpdateType = 12;
-constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kAppliedBytes = 12;
+constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kFoundBytes = 12,
+                      kPlaceBytes = 16;
 constexpr std::size_t kMishapBytes = 17, kPeerBytes = 44;  // at least
+constexpr std::uint8_t kHasBodies = 1, kHasCrossed = 2, kHasBroken = 4, kHasPlaces = 8;
 constexpr std::uint64_t kMostLinked = std::uint64_t{1} << 40;
 constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255, kLongestKey = 40;
 
@@ -70,25 +72,25 @@ StepReport read_report(ByteReader& in) {
     return r;
 }
 
-void write_applied(ByteWriter& out, const std::vector<std::uint32_t>& sources,
-                   const std::vector<std::uint64_t>& applied) {
-    if (sources.size() != applied.size())
-        throw std::invalid_argument(std::to_string(sources.size()) + " sources with " +
-                                    std::to_string(applied.size()) + " steps");
-    out.count(sources.size());
-    for (std::size_t i = 0; i < sources.size(); ++i) {
-        out.number(sources[i]);
-        out.number(applied[i]);
-    }
+void write_found(ByteWriter& out, const std::vector<FoundStep>& found) {
+    out.count(found.size());
+    for (const FoundStep& step : found) out.number(step.step), write(out, step.crossed);
 }
 
-void read_applied(ByteReader& in, std::vector<std::uint32_t>& sources, std::vector<std::uint64_t>& applied) {
-    sources.resize(in.count(kAppliedBytes));
-    applied.resize(sources.size());
-    for (std::size_t i = 0; i < sources.size(); ++i) {
-        sources[i] = in.number<std::uint32_t>();
-        applied[i] = in.number<std::uint64_t>();
-    }
+void read_found(ByteReader& in, std::vector<FoundStep>& found) {
+    found.resize(in.count(kFoundBytes));
+    for (FoundStep& step : found) step.step = in.number<std::uint64_t>(), step.crossed = read_crossed(in);
+}
+
+void write(ByteWriter& out, const Eigen::Vector3f& v) {
+    for (const float x : v) out.number(x);
+}
+
+Eigen::Vector3f read_place(ByteReader& in) {
+    Eigen::Vector3f v;
+    for (float& x : v) x = in.number<float>();
+    if (!v.allFinite()) throw DecodeError("a place that is not finite");
+    return v;
 }
 
 std::string shortened(const std::string& text) {
@@ -141,7 +143,9 @@ void write_body(ByteWriter& out, const Ownership& m) {
     out.number<std::uint8_t>(m.traded);
     out.number(m.step);
     write(out, m.bodies);
-    write_applied(out, m.sources, m.applied);
+    write(out, m.around);
+    out.count(m.around_step.size());
+    for (const std::uint64_t step : m.around_step) out.number(step);
 }
 void write_body(ByteWriter& out, const SnapshotMessage& m) {
     write(out, m.snapshot);
@@ -155,7 +159,6 @@ void write_body(ByteWriter& out, const StateMessage& m) {
 void write_body(ByteWriter& out, const UpdateMessage& m) {
     write(out, m.report);
     write(out, m.bodies);
-    write(out, m.crossed);
     write_numbers(out, m.broken);
 }
 void write_body(ByteWriter& out, const StruckAssign& m) {
@@ -166,9 +169,6 @@ void write_body(ByteWriter& out, const StruckStep& m) {
 }
 void write_body(ByteWriter& out, const StruckAnswer& m) {
     write(out, m);
-}
-void write_body(ByteWriter&, const PackedUpdates&) {
-    throw std::invalid_argument("an update message that is packed already");
 }
 void write_body(ByteWriter& out, const Offer& m) {
     if (m.bodies.size() != m.cost_s.size()) throw std::invalid_argument("an offer without all costs");
@@ -190,7 +190,6 @@ void write_body(ByteWriter& out, const Handover& m) {
     out.number(m.to);
     out.number(m.number);
     write(out, m.bodies);
-    write_applied(out, m.sources, m.applied);
 }
 
 void write_body(ByteWriter& out, const PartMessage& m) {
@@ -220,6 +219,42 @@ void write_body(ByteWriter& out, const PeersMessage& m) {
 void write_body(ByteWriter& out, const Gather& m) {
     out.number(m.to);
     write_numbers(out, m.bodies);
+}
+void write_body(ByteWriter& out, const NeighbourMessage& m) {
+    const std::uint8_t has = (m.bodies.places().empty() ? 0 : kHasBodies) |
+                             (m.crossed.empty() ? 0 : kHasCrossed) | (m.broken.empty() ? 0 : kHasBroken) |
+                             (m.places.empty() ? 0 : kHasPlaces);
+    out.number(has);
+    out.number(m.number);
+    out.number(m.heard);
+    out.number(m.smoothed_s);
+    out.number(m.own);
+    // Of none: low beyond high.
+    write(out, m.reach.box.isEmpty() ? Eigen::Vector3f::Ones() : m.reach.box.min());
+    write(out, m.reach.box.isEmpty() ? Eigen::Vector3f::Zero() : m.reach.box.max());
+    out.number(m.reach.parts);
+    out.number(m.reach.speed);
+    if (has & kHasBodies) {
+        out.count(m.bodies.places().size());
+        out.append(m.bodies.bytes());
+    }
+    if (has & kHasCrossed) write(out, m.crossed);
+    if (has & kHasBroken) write_numbers(out, m.broken);
+    if (!(has & kHasPlaces)) return;
+    out.count(m.places.size());
+    for (const NeighbourMessage::Place& place : m.places) {
+        out.number(place.body);
+        write(out, place.position);
+    }
+}
+void write_body(ByteWriter& out, const FoundMessage& m) {
+    out.number(m.number);
+    out.number(m.epoch);
+    write_found(out, m.steps);
+}
+void write_body(ByteWriter& out, const HeardMessage& m) {
+    out.number(m.number);
+    out.number<std::uint8_t>(m.again);
 }
 void write_body(ByteWriter& out, const LinkBeat& m) {
     out.number<std::uint8_t>(m.hears);
@@ -261,7 +296,10 @@ void read_body(ByteReader& in, Ownership& m) {
     m.traded = in.flag();
     m.step = in.number<std::uint64_t>();
     m.bodies = read_world_records(in);
-    read_applied(in, m.sources, m.applied);
+    m.around = read_world_records(in);
+    m.around_step.resize(in.count(8));
+    for (std::uint64_t& step : m.around_step) step = in.number<std::uint64_t>();
+    if (m.around_step.size() != m.around.size()) throw DecodeError("found states without their steps");
 }
 void read_body(ByteReader& in, SnapshotMessage& m) {
     m.snapshot = read_snapshot(in);
@@ -275,7 +313,6 @@ void read_body(ByteReader& in, StateMessage& m) {
 void read_body(ByteReader& in, UpdateMessage& m) {
     m.report = read_report(in);
     read_updates(in, m.bodies);
-    m.crossed = read_crossed(in);
     read_numbers(in, m.broken);
 }
 void read_body(ByteReader& in, PartMessage& m) {
@@ -303,6 +340,44 @@ void read_body(ByteReader& in, Gather& m) {
     m.to = in.number<std::uint32_t>();
     read_numbers(in, m.bodies);
 }
+void read_body(ByteReader& in, NeighbourMessage& m) {
+    const auto has = in.number<std::uint8_t>();
+    if (has >= 2 * kHasPlaces) throw DecodeError("lists of no known kind");
+    m.number = in.number<std::uint32_t>();
+    m.heard = in.number<std::uint32_t>();
+    m.smoothed_s = in.number<float>();
+    if (!(m.smoothed_s >= 0 && m.smoothed_s <= 1e9f)) throw DecodeError("a report of a time out of range");
+    m.own = in.number<std::uint32_t>();
+    const Eigen::Vector3f low = read_place(in), high = read_place(in);
+    if (std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff()) > static_cast<float>(kFurthestReach))
+        throw DecodeError("a reach out of range");
+    m.reach.box = {low, high};
+    m.reach.parts = in.number<std::uint64_t>();
+    m.reach.speed = in.number<float>();
+    if (!(m.reach.speed >= 0 && m.reach.speed <= 1e9f)) throw DecodeError("a speed out of range");
+    m.bodies.clear(), m.crossed.clear(), m.broken.clear(), m.places.clear();
+    if (has & kHasBodies) m.bodies.read(in);
+    if (has & kHasCrossed) m.crossed = read_crossed(in);
+    if (has & kHasBroken) read_numbers(in, m.broken);
+    if (has & kHasPlaces) m.places.resize(in.count(kPlaceBytes));
+    for (NeighbourMessage::Place& place : m.places) {
+        place.body = in.number<std::uint32_t>();
+        place.position = read_place(in);
+    }
+    const auto empty = [](const auto& list) { return list.empty(); };
+    if ((has & kHasBodies && empty(m.bodies.places())) || (has & kHasCrossed && empty(m.crossed)) ||
+        (has & kHasBroken && empty(m.broken)) || (has & kHasPlaces && empty(m.places)))
+        throw DecodeError("a list of nothing");
+}
+void read_body(ByteReader& in, FoundMessage& m) {
+    m.number = in.number<std::uint32_t>();
+    m.epoch = in.number<std::uint32_t>();
+    read_found(in, m.steps);
+}
+void read_body(ByteReader& in, HeardMessage& m) {
+    m.number = in.number<std::uint32_t>();
+    m.again = in.flag();
+}
 void read_body(ByteReader& in, LinkBeat& m) {
     m.hears = in.flag();
 }
@@ -318,9 +393,6 @@ void read_body(ByteReader& in, StruckStep& m) {
 }
 void read_body(ByteReader& in, StruckAnswer& m) {
     m = read_struck_answer(in);
-}
-void read_body(ByteReader&, PackedUpdates&) {
-    throw DecodeError("a message of no known type");
 }
 void read_body(ByteReader& in, Offer& m) {
     m.to = in.number<std::uint32_t>();
@@ -344,7 +416,6 @@ void read_body(ByteReader& in, Handover& m) {
     m.to = in.number<std::uint32_t>();
     m.number = in.number<std::uint32_t>();
     m.bodies = read_world_records(in);
-    read_applied(in, m.sources, m.applied);
 }
 
 /// The variant's alternative of index `type` - 1; what is there of that type is overwritten, so that its storage serves again.
@@ -409,26 +480,6 @@ std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessag
     std::memcpy(out.bytes().data() + kLengthAt, &length, sizeof length);
     out.number(crc32c(out.bytes()));
     return std::move(out.bytes());
-}
-
-DecodedMessage decode_for_worker(std::span<const std::uint8_t> bytes) {
-    DecodedMessage decoded;
-    const std::uint16_t type = read_header(bytes, decoded.header);
-    if (type != kUpdateType) {
-        read_message(type, bytes, decoded.message);
-        return decoded;
-    }
-    auto& packed = decoded.message.emplace<PackedUpdates>();
-    packed.bytes.assign(bytes.begin(), bytes.end());
-    const std::span<const std::uint8_t> all =
-        std::span<const std::uint8_t>(packed.bytes).first(bytes.size() - kChecksumBytes);
-    ByteReader in(all.subspan(kHeaderBytes));
-    packed.report = read_report(in);
-    find_updates(in, all, packed.bodies);
-    packed.crossed = read_crossed(in);
-    read_numbers(in, packed.broken);
-    in.expect_end();
-    return decoded;
 }
 
 DecodedMessage decode_message(std::span<const std::uint8_t> bytes) {

@@ -38,37 +38,45 @@ namespace sim {
 //    6 refusal    app     text
 //    7 end        app     nothing
 //    8 members    app     list of u32, flag owners follow
-//    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of applied
+//    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of record and of u64
+//                         (around, their steps)
 //   10 snapshot   app     u64 step, list of record, list of contact, list of spring, v3 outside impulse
 //   11 state      worker  report, list of record, list of contact, list of spring
-//   12 update     worker  report, lists of update, crossed, u32 (constraints that broke)
+//   12 update     worker  report, lists of update, u32 (constraints that broke)
 //   13 offer      worker  u32 to, u32 number, flag gathers, list of {u32 body, f32 seconds}
 //   14 answer     worker  u32 to, u32 number, flag accepted
-//   15 handover   worker  u32 to, u32 number, list of record, list of applied
+//   15 handover   worker  u32 to, u32 number, list of record
 //   16 part       worker  flag gave up, list of u8
 //   17 published  app     report, list of u32 (bodies)
-//   18 relay      worker  list of u32 (to), list of u8 (a part, encoded)
+//   18 relay      worker  list of u32 (to), list of u8 (a message to these, encoded)
 //   19 peers      app     list of {u32 worker, texts endpoint, key, 16 bytes: what it says, 16 bytes: what it hears}
 //   20 link       worker  flag hears
 //   21 reach      worker  texts endpoint, key
 //   22 to 24 of struck bodies, see struck_messages.h; of the others a play and its workers use 1, 2, 4, 6 and 7
 //   25 gather    app     u32 to, list of u32 (bodies)
 //   26 leaves    worker  nothing
+//   27 neighbour worker  u8 (1 bodies, 2 crossed, 4 broken, 8 places), u32 number, u32 heard, f32 smoothed, u32 own, w3 low, w3 high, u64 parts,
+//                        f32 speed; lists, if they are there, of update, crossed, u32 (constraints that broke), place
+//   28 found     worker  u32 number, u32 epoch, list of {u64 step, list of crossed}
+//   29 heard     worker  u32 number, flag again
 //
 //   report      68 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
 //               cross contacts, own; u64 linked; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
-//   applied     12 bytes: u32 worker, u64 step
 //   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
 //               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
 //               v3 angular momentum, f64 q[m], f64 q'[m]
 //   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging),
 //               u8 n points of {u32 feature, w3 arm, f32 normal impulse, w3 friction impulse}
 //   spring      17 bytes: u32 constraint, flag holds, w3 impulse
-//   update      36 + 4 m bytes, 84 with 12 modes; if held, 12 + 2 m more, 120 in all:
+//   update      37 + 3 m bytes, 73 with 12 modes, 36 with none; if held, 13 + m more, 98 in all:
 //               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
 //               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of
-//               2^(4 E - 44) kg m^2/s, f16 q[m], f16 q'[m]; held: 3 f16 linear, 3 f16 angular, f16 modal[m]
-//   crossed     45 bytes: u32 own, u32 other, flag blow, w3 linear on own, w3 angular on own, w3 angular on other
+//               2^(4 E - 44) kg m^2/s, f16 q[m], small q'[m]; held: 3 f16 linear, 3 f16 angular, small modal[m]
+//   small       of n numbers, if there are any: i8 E, n i8 in units of 2^E, E the least with which none is beyond 127
+//   found       16 bytes and its crossed: u32 worker, u64 step, list of crossed
+//   place       16 bytes: u32 body, w3 position
+//   crossed     33 bytes: u32 own (+ 2^31: blow), u32 other, u8 E of the first and 16 times E of the second, w3 linear on own,
+//               3 i16 angular on own, 3 i16 angular on other, in units of 2^(4 E - 44) kg m^2/s
 //   scene, settings: see world_scene_codec.cpp
 //
 // The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
@@ -77,7 +85,7 @@ namespace sim {
 //
 // Largest quantisation errors of an update: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
 // angular momentum 1/4095 of its largest coordinate (plus 2^-45 kg m^2/s; range 2.1e9); f16 2^-11 of each
-// number (plus 3e-8; range 65504).
+// number (plus 3e-8; range 65504); small 1/127 of the largest (plus 2^-129).
 //
 // A state that is not finite or beyond 1e7 m or 1e6 m/s is broken; World takes the body out at the next
 // step. Its numbers do not travel: zeros stand for them (and w = 1 for the orientation; in an update the
@@ -149,6 +157,11 @@ struct Members {
     /// step with others.
     bool owners_follow = false;
 };
+/// Impulses at the contacts of own bodies with others' that a worker found in a step.
+struct FoundStep {
+    std::uint64_t step = 0;
+    std::vector<CrossImpulse> crossed;  ///< as floats; ascending by (own, ghost)
+};
 /// Registered ownership: `owner` steps these bodies from the end of step `step` on. The header's epoch is the
 /// new one.
 struct Ownership {
@@ -157,16 +170,16 @@ struct Ownership {
     bool traded = false;  ///< to a buyer; else at the start, after a loss, or as one drains in lockstep
     std::uint64_t step = 0;
     std::vector<WorldRecord> bodies;  ///< exact; without a handover in bounded pace as last published
-    /// Bounded, of what was handed over: the states include what came of these workers' messages up to these steps.
-    std::vector<std::uint32_t> sources;
-    std::vector<std::uint64_t> applied;
+    /// Bounded, to the owner alone, which was not told of what is here before: others' bodies near these, as last published.
+    std::vector<WorldRecord> around = {};
+    std::vector<std::uint64_t> around_step = {};  ///< of each
 };
 /// Everything at the end of a step that all have done, for a worker that joins late, or a run that goes on from there.
 struct SnapshotMessage {
     WorldSnapshot snapshot;
 };
 
-// Worker to the application after each step, which passes it on.
+// Worker to the application after each step.
 
 /// Lockstep: all own bodies, and the contacts and constraints that belong to them. Passed on to those who own nothing.
 /// Bounded: own bodies once more after the last step, exact, as what came late has put them right. For the application alone.
@@ -177,7 +190,7 @@ struct StateMessage {
     std::vector<SpringRecord> springs;
 };
 
-/// Bounded. One body's state, quantised: at most 120 bytes with 12 modes.
+/// Bounded. One body's state, quantised: at most 98 bytes with 12 modes.
 struct Update {
     std::uint32_t body = 0;
     bool asleep = false, still = false, quarantined = false;
@@ -185,10 +198,9 @@ struct Update {
     bool held = false;    ///< whether `impulse` is there
     StepImpulse impulse;  ///< from the owner's other bodies, the mean of a step; linear, angular, modal
 };
-struct UpdateMessage {
+struct UpdateMessage {  ///< all that the step made of own bodies
     StepReport report;
     std::vector<Update> bodies;         ///< own, ascending
-    std::vector<CrossImpulse> crossed;  ///< of own bodies with others' in the last step, as floats; ascending
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
 };
 
@@ -199,26 +211,69 @@ struct PublishedMessage {
     std::vector<std::uint32_t> bodies;
 };
 
-/// An UpdateMessage as a worker gets it: of hundreds of bodies it needs the few that are near, so states are
-/// read one by one when they are needed.
-struct PackedUpdates {
+/// Updates as bytes: of those that one worker tells another few are needed soon, and those are read then.
+class PackedUpdates {
+public:
     struct Place {
         std::uint32_t body, offset;
-    };
-    StepReport report;
-    std::vector<std::uint32_t> broken;
-    std::vector<CrossImpulse> crossed;
-    std::vector<std::uint8_t> bytes;
-    std::vector<Place> bodies;  ///< in bytes; ascending
-
-    /// Throw DecodeError.
-    void update(std::uint32_t offset, Update& into) const;
-    /// The part of an update that is needed to find near bodies.
-    struct Glance {
-        Eigen::Vector3d position, velocity;  ///< [m], [m/s]
+        Eigen::Index modes;
         bool asleep, quarantined;
+        Eigen::Vector3d position, velocity;  ///< [m], [m/s]
     };
-    [[nodiscard]] Glance glance(std::uint32_t offset) const;  ///< of the update at `offset`
+    [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
+    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
+    void clear() { bytes_.clear(), places_.clear(); }
+    void add(const Update& update);
+    /// One of other packed updates.
+    void add(const PackedUpdates& from, const Place& place);
+    /// Those that follow there; each is read once. Throws DecodeError.
+    void read(ByteReader& in);
+    void read(const Place& place, Update& into) const;
+
+private:
+    std::vector<std::uint8_t> bytes_;
+    std::vector<Place> places_;
+};
+
+constexpr double kFurthestReach = 1e8;  ///< of a reach, from the origin [m]
+/// Where a worker's bodies are and go, see shared/nearness.h: a box around them [m], which is empty if it has none; of its two longest
+/// sides, each cut into 8, those of the 64 parts in which they are.
+struct Reach {
+    Eigen::AlignedBox3f box;
+    std::uint64_t parts = 0;
+    float speed = 0;  ///< of the fastest [m/s]
+};
+/// Bounded, worker to worker after each step, see workers/peer_links.h: what the receiver needs of it. Bodies that it does not name
+/// are not near the receiver's, unless they sleep and it was told so.
+struct NeighbourMessage {
+    std::uint32_t number =
+        0;  ///< from 1, of what the sender tells the receiver in NeighbourMessages and FoundMessages
+    std::uint32_t heard = 0;  ///< the sender has heard the receiver's up to this number
+    float smoothed_s = 0;     ///< see WorkerStep
+    std::uint32_t own = 0;    ///< number of the sender's bodies
+    Reach reach;              ///< of these
+    PackedUpdates bodies;     ///< ascending
+    std::vector<CrossImpulse>
+        crossed;  ///< of own bodies with the receiver's in the last step, as floats; ascending
+    std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
+    struct Place {
+        std::uint32_t body = 0;
+        Eigen::Vector3f position = Eigen::Vector3f::Zero();
+    };
+    std::vector<Place> places;  ///< of all own bodies, every kPlacesEvery steps, for load balancing
+};
+constexpr std::uint64_t kPlacesEvery = 32;
+/// Bounded, worker to worker, to who has just got bodies: what the sender found at them in the last steps.
+struct FoundMessage {
+    std::uint32_t number = 0;  ///< see NeighbourMessage
+    std::uint32_t epoch = 0;   ///< in which they changed owners
+    std::vector<FoundStep> steps;
+};
+/// Bounded, worker to worker: the sender has heard the receiver's messages up to this number. again: it waits, and asks for the later
+/// ones, by way of the application.
+struct HeardMessage {
+    std::uint32_t number = 0;
+    bool again = false;
 };
 
 // Worker to worker, through the application. The market.
@@ -237,8 +292,6 @@ struct OfferAnswer {
 struct Handover {
     std::uint32_t to = 0, number = 0;
     std::vector<WorldRecord> bodies;
-    std::vector<std::uint32_t> sources;  ///< see Ownership
-    std::vector<std::uint64_t> applied;
 };
 
 /// From the application, in bounded pace: these bodies belong to a structure (shared/structures.h) of which another worker has
@@ -254,7 +307,7 @@ struct PartMessage {
     bool gave_up = false;
     std::vector<std::uint8_t> bytes;
 };
-/// To the application: a part for those whom its sender cannot reach.
+/// To the application: a message to other workers, for those whom its sender cannot reach.
 struct RelayMessage {
     std::vector<std::uint32_t> to;
     std::vector<std::uint8_t> part;  ///< encoded
@@ -284,15 +337,14 @@ using WorkerMessage =
     std::variant<JoinRequest, Beat, Drained, WorkerFailure, SceneMessage, Refusal, EndOfRun, Members,
                  Ownership, SnapshotMessage, StateMessage, UpdateMessage, Offer, OfferAnswer, Handover,
                  PartMessage, PublishedMessage, RelayMessage, PeersMessage, LinkBeat, ReachMessage,
-                 StruckAssign, StruckStep, StruckAnswer, Gather, Leaves, PackedUpdates>;
+                 StruckAssign, StruckStep, StruckAnswer, Gather, Leaves, NeighbourMessage, FoundMessage,
+                 HeardMessage>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessage& message);
 struct DecodedMessage {
     MessageHeader header;
     WorkerMessage message;
 };
-/// The same, for workers: update messages as PackedUpdates (which encode does not take).
-[[nodiscard]] DecodedMessage decode_for_worker(std::span<const std::uint8_t> bytes);
 /// Throws DecodeError for anything that encode cannot have written.
 [[nodiscard]] DecodedMessage decode_message(std::span<const std::uint8_t> bytes);
 /// The same, into the storage of the last one; what is there after a DecodeError is of no use.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "shared/initial_partition.h"
+#include "shared/nearness.h"
 
 namespace sim {
 namespace {
@@ -46,6 +47,7 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
                         !are_alike(all, lots_, structures(view_.world(), there_now(), columns_.side()));
     if (result_.one_owner) settings_.market.trade = false;
     if (settings_.pace == Pace::lockstep) return;
+    check_.emplace(all, scene_.world.constraints.size(), settings_.steps);
     planned_.emplace(scene_, columns_.side(), structure_outlook(settings_.bound, scene_.world.settings.dt));
 }
 
@@ -128,22 +130,14 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
 }
 
 // A snapshot at the view's step and everything published of later ones. In lockstep a record that came with
-// ownership must not be known before the contacts that were published with it; in bounded pace an update
-// means something only with its owner known.
+// ownership must not be known before the contacts that were published with it.
 void Coordinator::catch_up(std::uint32_t worker) {
     send({worker}, SnapshotMessage{view_.snapshot()});
-    auto updates = [&] {
-        for (const auto& [step, bytes] : kept_) queue_.push_back({{worker}, bytes});
-    };
-    auto owners = [&] {
-        std::vector<int> all;
-        for (int i = 0; i < static_cast<int>(bodies_.size()); ++i)
-            if (view_.clock().moves(i) && owner(i) != kApplication) all.push_back(i);
-        for (const Group& group : groups(all)) send({worker}, ownership(group));
-    };
-    if (settings_.pace == Pace::bounded) owners();
-    updates();
-    if (settings_.pace == Pace::lockstep) owners();
+    for (const auto& [step, bytes] : kept_) queue_.push_back({{worker}, bytes});
+    std::vector<int> all;
+    for (int i = 0; i < static_cast<int>(bodies_.size()); ++i)
+        if (view_.clock().moves(i) && owner(i) != kApplication) all.push_back(i);
+    for (const Group& group : groups(all)) send({worker}, ownership(group));
 }
 
 void Coordinator::start() {
@@ -223,10 +217,35 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
         Ownership message = ownership(group);
         message.from = from;
         message.traded = handed && handed->to == owner;
-        if (handed) message.sources = handed->sources, message.applied = handed->applied;
-        send(members_, message);
+        if (settings_.pace == Pace::bounded && from != kApplication) {
+            std::vector<std::uint32_t> others = members_;
+            std::erase(others, owner);
+            send(std::move(others), message);
+            add_what_is_around(message);
+            send({owner}, message);
+        } else {
+            send(members_, message);
+        }
         observer_->moved(group.step, static_cast<int>(group.bodies.size()),
                          from == kApplication ? -1 : static_cast<int>(from), static_cast<int>(owner));
+    }
+}
+
+// For its owner, to whom others have told only what was near it before.
+void Coordinator::add_what_is_around(Ownership& message) const {
+    const WorldSettings& settings = scene_.world.settings;
+    const double time =
+        std::max(near_steps(settings_.bound) * settings.dt, structure_outlook(settings_.bound, settings.dt));
+    const Outlook outlook{time, settings.dt, settings.gravity.norm()};
+    const double radius = kWidest * columns_.side();
+    const Reach reach = reach_of(message.bodies, radius, outlook);
+    for (int i = 0; i < view_.world().bodies() && !reach.box.isEmpty(); ++i) {
+        const Body& body = bodies_[static_cast<std::size_t>(i)];
+        if (!view_.clock().moves(i) || body.owner == message.owner) continue;
+        const Eigen::AlignedBox3f box = box_of_way(body.record.state, radius, outlook);
+        if (box.isEmpty() || !meets(box, reach)) continue;
+        message.around.push_back(body.record);
+        message.around_step.push_back(body.step);
     }
 }
 
@@ -328,6 +347,8 @@ std::vector<std::uint32_t> Coordinator::staying() const {
 void Coordinator::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     leaving_.erase(worker);
+    std::erase_if(asked_,
+                  [worker](const auto& a) { return a.first.first == worker || a.first.second == worker; });
     for (Body& body : bodies_)
         if (body.asked_to == worker) body.asked_at = 0, body.asked_to = kApplication;
     gone_.push_back(worker);
@@ -347,14 +368,31 @@ void Coordinator::lose(std::uint32_t worker, const std::string& why) {
     remove(worker);
 }
 
+void Coordinator::note_waiting() {
+    for (auto& [who, for_long] : asked_) for_long = true;
+}
+
+// In bounded pace who holds that one up by telling it nothing, see asked_.
 void Coordinator::lose_slowest(const std::string& why) {
     const Body* oldest = nullptr;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
         const Body& body = bodies_[static_cast<std::size_t>(i)];
-        if (view_.clock().moves(i) && is_member(body.owner) && (!oldest || body.step < oldest->step))
+        if (view_.clock().moves(i) && is_member(body.owner) && !senders_[body.owner].settled &&
+            (!oldest || body.step < oldest->step))
             oldest = &body;
     }
-    if (oldest) lose(oldest->owner, why);
+    if (!oldest) return;
+    std::uint32_t worker = oldest->owner;
+    for (std::set<std::uint32_t> seen = {worker};;) {
+        const auto asked = std::ranges::find_if(asked_, [&](const auto& a) {
+            const auto& [from, to] = a.first;
+            return a.second && from == worker && is_member(to) && !seen.contains(to);
+        });
+        if (asked == asked_.end()) break;
+        worker = asked->first.second;
+        seen.insert(worker);
+    }
+    lose(worker, why);
 }
 
 // The view.
@@ -372,7 +410,7 @@ void Coordinator::advance() {
             gather(), ask_who_leaves();
         observer_->at(view_.step(), world);
         tell_ready();
-        std::erase_if(kept_, [this](const auto& kept) { return kept.first + kept_steps_ <= view_.step(); });
+        std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
     }
 }
 

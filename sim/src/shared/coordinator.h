@@ -5,6 +5,7 @@
 #include <set>
 
 #include "shared/columns.h"
+#include "shared/neighbour_check.h"
 #include "shared/shared_contacts.h"
 #include "shared/structures.h"
 #include "shared/world_view.h"
@@ -16,8 +17,8 @@ namespace sim {
 
 /// Coordinator of a shared world, without clock or transport: keeps membership and the register of owners,
 /// passes messages on, and assembles the view of the whole world. All workers hear of members, owners and what was published
-/// in one order: a worker is a member for all or for none, and each body has one owner. What workers in lockstep tell each
-/// other within a step goes from one to the other; to those that cannot be reached it is passed on here.
+/// in one order: a worker is a member for all or for none, and each body has one owner. What workers tell each
+/// other of a step, and within one, goes from one to the other; to those that cannot be reached it is passed on here.
 ///
 /// Bodies that do not move have no owner. Bodies that are added later have owners from the start, effective
 /// from the step before which they are added.
@@ -43,12 +44,16 @@ public:
     void lose(std::uint32_t worker,
               const std::string& why);  ///< its bodies go to the others; its later messages are dropped
     /// Removes the member whose bodies hold up the others: the one that owns a body of which the oldest state
-    /// is known. What else it has said, or published again, does not count.
+    /// is known; or, if that one asked another for what it has not heard, and has no answer, that other. What else it has said, or
+    /// published again, does not count.
     void lose_slowest(const std::string& why);
+    /// Some time before that: who has no answer by then, and gets none, waits for it.
+    void note_waiting();
     /// Steps that all bodies have done.
     [[nodiscard]] std::uint64_t steps() const noexcept { return view_.step(); }
     [[nodiscard]] std::vector<Outgoing> outgoing();  ///< queued messages; empties the queue
     [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
+    [[nodiscard]] bool is_member(std::uint32_t worker) const;
     [[nodiscard]] bool finished() const noexcept { return finished_; }  ///< all steps are done
     /// elapsed_s is that of the state which the run went on from.
     [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }
@@ -96,16 +101,16 @@ private:
     void take_handover(const MessageHeader& header, Handover&& message);
     void take_reach(const MessageHeader& header, ReachMessage&& message);
     void take_relay(const MessageHeader& header, RelayMessage&& message);
+    [[nodiscard]] bool note_asked(std::uint32_t worker, std::uint32_t other, bool again);
+    [[nodiscard]] bool is_for_others(const DecodedMessage& part) const;
     void take_dealing(const MessageHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
     void report(const MessageHeader& header, const StepReport& report, std::size_t records,
                 std::size_t bytes);
-    void pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes);  ///< bounded
     void pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                  const StateMessage& states);
     void refuse(std::uint32_t worker, const std::string& why);
     void expel(std::uint32_t worker, const std::string& why);
     [[nodiscard]] bool is_too_much(Sender& sender, std::size_t bytes) const;
-    [[nodiscard]] bool is_member(std::uint32_t worker) const;
     [[nodiscard]] bool owns(std::uint32_t worker, std::uint32_t body) const;
     [[nodiscard]] bool fits(std::uint32_t body, Eigen::Index modes) const;
     [[nodiscard]] bool fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const;
@@ -129,6 +134,7 @@ private:
     void register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,
                         const Handover* handed = nullptr);
     [[nodiscard]] Ownership ownership(const Group& group) const;
+    void add_what_is_around(Ownership& message) const;
     void catch_up(std::uint32_t worker);
     void tell_ready();
     void release();
@@ -159,10 +165,10 @@ private:
     std::uint32_t next_worker_ = 0, epoch_ = 0;
     bool started_ = false, finished_ = false, goes_on_ = false;
     std::vector<Outgoing> queue_;
-    /// State and update messages for workers that join later: of steps that the view has not reached and, in bounded pace, of
-    /// `kept_steps_` before it.
-    const std::uint64_t kept_steps_ =
-        settings_.pace == Pace::bounded ? static_cast<std::uint64_t>(blow_window(settings_.bound)) : 0;
+    std::optional<NeighbourCheck> check_;
+    /// Bounded: who asked whom for what it has not heard of it, and has no answer; whether that was so for long, see note_waiting.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, bool> asked_;
+    /// Lockstep: state messages for workers that join later, of steps that the view has not reached.
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
     /// Mishaps as workers told them first, by body or constraint.
     std::map<int, QuarantinedBody> quarantined_;

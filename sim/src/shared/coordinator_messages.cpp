@@ -107,20 +107,40 @@ void Coordinator::take_message(const MessageHeader& header, std::span<const std:
 
 void Coordinator::take_relay(const MessageHeader& header, RelayMessage&& message) {
     const DecodedMessage part = decode_message(message.part);
-    if (settings_.pace != Pace::lockstep || !std::holds_alternative<PartMessage>(part.message) ||
-        part.header.worker != header.worker || part.header.step > settings_.steps)
-        return expel(header.worker, "found a message to others that is no part of a step");
+    if (part.header.worker != header.worker || part.header.step > settings_.steps ||
+        part.header.epoch > epoch_ || !is_for_others(part))
+        return expel(header.worker, "found a message to others that no worker tells another");
     std::vector<std::uint32_t> to;
     for (const std::uint32_t member : members_)
         if (member != header.worker && std::ranges::find(message.to, member) != message.to.end())
             to.push_back(member);
+    if (const auto* heard = std::get_if<HeardMessage>(&part.message))
+        std::erase_if(to,
+                      [&](std::uint32_t other) { return !note_asked(header.worker, other, heard->again); });
     if (!to.empty()) queue_.push_back({std::move(to), shared(message.part)});
 }
 
-// Tells those with whom it may do steps together, and it of them.
+// Whether the other one is to hear of it: not who has not answered yet. Who was asked may answer as often.
+bool Coordinator::note_asked(std::uint32_t worker, std::uint32_t other, bool again) {
+    if (again) return asked_.try_emplace({worker, other}, false).second;
+    if (asked_.erase({other, worker}) > 0) --senders_[worker].messages;
+    return true;
+}
+
+// Whether workers tell each other such, at this pace. Throws DecodeError if it cannot be.
+bool Coordinator::is_for_others(const DecodedMessage& part) const {
+    if (settings_.pace == Pace::lockstep) return std::holds_alternative<PartMessage>(part.message);
+    if (const auto* told = std::get_if<NeighbourMessage>(&part.message))
+        return check_->check(part.header, *told), true;
+    if (const auto* found = std::get_if<FoundMessage>(&part.message))
+        return check_->check(part.header, *found), true;
+    return std::holds_alternative<HeardMessage>(part.message);
+}
+
+// Tells those to whom it may tell its steps, and it of them.
 void Coordinator::take_reach(const MessageHeader& header, ReachMessage&& message) {
     Sender& here = senders_[header.worker];
-    if (settings_.pace != Pace::lockstep || !settings_.together || !here.reach.endpoint.empty())
+    if ((settings_.pace == Pace::lockstep && !settings_.together) || !here.reach.endpoint.empty())
         return refuse(header.worker, "found a link that nobody waits for");
     // Behind a translation of addresses nobody finds it; and a member must not have others connect to somebody else.
     if (!may_listen(here.address, message.endpoint)) return;
@@ -220,14 +240,10 @@ void Coordinator::take_update(const MessageHeader& header, std::span<const std::
         return owns(header.worker, u.body) && fits(u.body, u.state.q.size()) &&
                (!u.held || fits(u.body, u.impulse.modal.size()));
     });
-    const bool crossed = std::ranges::all_of(message.crossed, [&](const CrossImpulse& c) {
-        return owns(header.worker, static_cast<std::uint32_t>(c.own)) &&
-               c.ghost < static_cast<int>(bodies_.size()) && view_.clock().moves_at(c.ghost, header.step);
-    });
     const bool constraints = std::ranges::all_of(
         message.broken, [&](std::uint32_t c) { return owns_constraint(header.worker, static_cast<int>(c)); });
-    if (settings_.pace != Pace::bounded || !own || !crossed || !constraints ||
-        !fits(message.report.mishaps) || header.step <= senders_[header.worker].step)
+    if (settings_.pace != Pace::bounded || !own || !constraints || !fits(message.report.mishaps) ||
+        header.step <= senders_[header.worker].step)
         return expel(header.worker, "found states that are not its to publish");
     for (const std::uint32_t c : message.broken) view_.break_constraint(static_cast<int>(c));
     for (const Update& update : message.bodies) {
@@ -240,7 +256,6 @@ void Coordinator::take_update(const MessageHeader& header, std::span<const std::
     const bool last = header.step == settings_.steps;
     if (!last) extend_sleep(header);
     report(header, message.report, message.bodies.size(), bytes.size());
-    pass_on(header, bytes);
     if (!last) view_.take(header.step, message.bodies);
 }
 
@@ -273,8 +288,7 @@ void Coordinator::extend_sleep(const MessageHeader& header) {
 }
 
 void Coordinator::take_handover(const MessageHeader& header, Handover&& message) {
-    const auto later = [&](std::uint64_t step) { return step > header.step; };
-    if (!fits(header.worker, message.bodies) || std::ranges::any_of(message.applied, later))
+    if (!fits(header.worker, message.bodies))
         return refuse(header.worker, "found bodies that are not its to hand over");
     std::vector<int> bodies;
     for (const WorldRecord& record : message.bodies) {
@@ -305,14 +319,6 @@ void Coordinator::take_handover(const MessageHeader& header, Handover&& message)
         register_owner(bodies, header.worker, header.worker, &message);
     }
     advance();
-}
-
-void Coordinator::pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes) {
-    const auto copy = shared(bytes);
-    std::vector<std::uint32_t> others = members_;
-    std::erase(others, header.worker);
-    if (!others.empty()) queue_.push_back({std::move(others), copy});
-    kept_.emplace_back(header.step, copy);
 }
 
 // Who owns something does the steps itself.

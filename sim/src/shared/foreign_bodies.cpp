@@ -28,13 +28,14 @@ ForeignBodies::ForeignBodies(World& world, std::uint32_t self, int bodies, int k
       keep_(static_cast<std::size_t>(keep_steps)),
       newest_(static_cast<std::size_t>(bodies)) {}
 
-ForeignBodies::Heard& ForeignBodies::slot(std::uint32_t worker, std::uint64_t step) {
+// nullptr: it is too old.
+ForeignBodies::Heard* ForeignBodies::slot(std::uint32_t worker, std::uint64_t step) {
     std::vector<Heard>& slots = heard_[worker];
     slots.resize(keep_);
     Heard& slot = slots[step % keep_];
-    slot.step = step;
-    slot.message.reset();
-    return slot;
+    if (slot.step > step) return nullptr;
+    if (std::exchange(slot.step, step) != step) slot.there = false, slot.bodies.clear(), slot.crossed.clear();
+    return &slot;
 }
 
 const ForeignBodies::Heard* ForeignBodies::heard(std::uint32_t worker, std::uint64_t step) const {
@@ -45,24 +46,65 @@ const ForeignBodies::Heard* ForeignBodies::heard(std::uint32_t worker, std::uint
 }
 
 void ForeignBodies::keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed) {
-    slot(self_, step).crossed = crossed;
+    if (Heard* own = slot(self_, step)) own->crossed = crossed, own->there = true;
 }
 
-void ForeignBodies::take(std::uint32_t worker, std::uint64_t step, PackedUpdates&& message) {
-    Heard& heard = slot(worker, step);
-    heard.crossed = std::move(message.crossed);
-    for (std::size_t i = 0; i < message.bodies.size(); ++i) {
-        const PackedUpdates::Place& place = message.bodies[i];
-        if (place.body >= newest_.size()) continue;
-        const PackedUpdates::Glance glance = message.glance(place.offset);
-        tell(static_cast<int>(place.body), step, worker, glance, i);
-        // It is not told again before it wakes.
-        if (!glance.asleep) continue;
-        Told& rest = rest_[static_cast<int>(place.body)];
-        rest.step = step;
-        message.update(place.offset, rest.update);
+void ForeignBodies::add(std::uint32_t worker, const FoundStep& found) {
+    Heard* heard = slot(worker, found.step);
+    if (!heard) return;
+    const auto pair_of = [](const CrossImpulse& c) { return std::pair(c.own, c.ghost); };
+    for (const CrossImpulse& c : found.crossed) {
+        const auto at = std::ranges::lower_bound(heard->crossed, pair_of(c), {}, pair_of);
+        if (at == heard->crossed.end() || pair_of(*at) != pair_of(c)) heard->crossed.insert(at, c);
     }
-    heard.message = std::make_shared<const PackedUpdates>(std::move(message));
+}
+
+std::vector<FoundStep> ForeignBodies::found_at(const std::vector<int>& bodies) const {
+    std::vector<FoundStep> found;
+    const auto slots = heard_.find(self_);
+    if (slots == heard_.end()) return found;
+    for (const Heard& heard : slots->second) {
+        FoundStep step{heard.step, {}};
+        std::ranges::copy_if(heard.crossed, std::back_inserter(step.crossed), [&](const CrossImpulse& c) {
+            return std::ranges::binary_search(bodies, c.ghost) || std::ranges::binary_search(bodies, c.own);
+        });
+        if (!step.crossed.empty()) found.push_back(std::move(step));
+    }
+    return found;
+}
+
+void ForeignBodies::take(std::uint32_t worker, std::uint64_t step, NeighbourMessage&& message,
+                         const std::vector<std::uint32_t>& owner) {
+    Heard* heard = slot(worker, step);
+    if (!heard) return;
+    add(worker, {step, std::move(message.crossed)});
+    heard->there = true;
+    const std::vector<PackedUpdates::Place>& bodies = message.bodies.places();
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+        const PackedUpdates::Place& place = bodies[i];
+        if (owner[place.body] != worker) continue;
+        const auto body = static_cast<int>(place.body);
+        tell(body, step, worker, {place.position, place.velocity, place.asleep, place.quarantined}, i);
+        // It is not told again before it wakes.
+        if (!place.asleep) continue;
+        Told& rest = rest_[body];
+        rest.step = step;
+        message.bodies.read(place, rest.update);
+    }
+    for (const NeighbourMessage::Place& place : message.places)
+        if (Newest& newest = newest_[place.body];
+            owner[place.body] == worker && newest.step < step && !newest.glance.asleep)
+            newest.glance.position = place.position.cast<double>();
+    heard->bodies = std::move(message.bodies);
+}
+
+void ForeignBodies::born(const WorldRecord& record, std::uint64_t step) {
+    if (!known(record.body)) return set(record, step);
+    const auto [entry, fresh] = rest_.try_emplace(record.body);
+    if (!fresh) return;
+    entry->second.step = step;
+    entry->second.update.body = static_cast<std::uint32_t>(record.body);
+    entry->second.update.state = record.state;
 }
 
 void ForeignBodies::set(const WorldRecord& record, std::uint64_t step) {
@@ -76,9 +118,10 @@ void ForeignBodies::set(const WorldRecord& record, std::uint64_t step) {
          {record.state.position, record.state.velocity, record.asleep, record.quarantined}, 0);
 }
 
-void ForeignBodies::tell(int body, std::uint64_t step, std::uint32_t worker,
-                         const PackedUpdates::Glance& glance, std::size_t index) {
+void ForeignBodies::tell(int body, std::uint64_t step, std::uint32_t worker, const Glance& glance,
+                         std::size_t index) {
     Newest& newest = newest_[static_cast<std::size_t>(body)];
+    if (worker != kApplication && step < newest.step) return;  // of who has sold it
     const bool other = newest.worker != kApplication && newest.worker != worker;
     newest = {step,
               worker,
@@ -96,8 +139,8 @@ ForeignBodies::Message ForeignBodies::last_until(int body, std::uint32_t worker,
     const auto slots = heard_.find(worker);
     for (std::uint64_t step = from, left = keep_; slots != heard_.end() && left > 0; --left, --step) {
         const Heard& slot = slots->second[step % keep_];
-        if (slot.step != step || !slot.message) break;
-        const auto& places = slot.message->bodies;
+        if (slot.step != step) break;
+        const std::vector<PackedUpdates::Place>& places = slot.bodies.places();
         if (index >= places.size() || places[index].body != static_cast<std::uint32_t>(body)) {
             const auto place = std::ranges::lower_bound(places, static_cast<std::uint32_t>(body), {},
                                                         &PackedUpdates::Place::body);
@@ -110,6 +153,13 @@ ForeignBodies::Message ForeignBodies::last_until(int body, std::uint32_t worker,
     return best;
 }
 
+// Whether what was registered, or told when it fell asleep, is nearer to `now` than what was told of a step. Who slept does so until
+// it is told otherwise.
+bool ForeignBodies::counts(const Told& rest, std::uint64_t step, std::uint64_t now) {
+    if (rest.step > now) return false;
+    return step <= now ? rest.step > step : rest.update.asleep || now - rest.step <= step - now;
+}
+
 // Into told_. Of a body that was sold a worker that is behind needs what its owner before told.
 void ForeignBodies::find_told(int body, std::uint64_t now) {
     const Newest& newest = newest_[static_cast<std::size_t>(body)];
@@ -120,15 +170,11 @@ void ForeignBodies::find_told(int body, std::uint64_t now) {
         const Message before = last_until(body, newest.worker_before, newest.step_before, now, 0);
         if (before.heard && (!best.heard || before.heard->step < best.heard->step)) best = before;
     }
-    const bool later = best.heard && best.heard->step > now;
-    if (registered &&
-        (!best.heard || (rest->second.step <= now && (later || rest->second.step > best.heard->step)))) {
-        told_ = rest->second;
-    } else if (best.heard) {
-        told_.step = best.heard->step;
-        best.heard->message->update(best.heard->message->bodies[best.index].offset, told_.update);
+    if (!best.heard || (registered && counts(rest->second, best.heard->step, now))) {
+        told_ = rest_.at(body);  // who is known was registered at first
     } else {
-        told_ = {};
+        told_.step = best.heard->step;
+        best.heard->bodies.read(best.heard->bodies.places()[best.index], told_.update);
     }
 }
 
@@ -167,7 +213,7 @@ ForeignBall ForeignBodies::ball(int body, std::uint64_t now) {
     for (int there = static_cast<int>(radius_.size()); there < world_->bodies(); ++there)
         radius_.push_back(1.02 * world_->most_radius(there));
     const Newest& newest = newest_[static_cast<std::size_t>(body)];
-    const PackedUpdates::Glance& s = newest.glance;
+    const Glance& s = newest.glance;
     const double age = s.asleep ? 0 : (static_cast<double>(now) - static_cast<double>(newest.step)) * dt_;
     const double speed = s.velocity.norm(), fall = gravity_ * (std::abs(age) + dt_);
     return {body, s.position + age * s.velocity,

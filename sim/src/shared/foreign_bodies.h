@@ -11,8 +11,8 @@ namespace sim {
 /// a stack swing each other up (tests/sim/shared/shared_stack_test.cpp).
 constexpr int kHeldSteps = 32;
 
-/// What one worker has heard of all others in bounded pace: their messages of the last steps, and from them the states of
-/// their bodies at any step near these.
+/// What one worker has heard of the others in bounded pace: their messages of the last steps, and from them the states of
+/// those of their bodies that are near at any step near these.
 class ForeignBodies {
 public:
     /// `world` provides body kinds and the step of free motion; its state is not changed.
@@ -21,11 +21,20 @@ public:
     /// What a worker said of a step. Own messages hold only `crossed`.
     struct Heard {
         std::uint64_t step = 0;
-        std::shared_ptr<const PackedUpdates> message;
+        bool there = false;  ///< its message has come
+        PackedUpdates bodies;
         std::vector<CrossImpulse> crossed;
     };
-    void take(std::uint32_t worker, std::uint64_t step, PackedUpdates&& message);
+    /// Of later steps from time to time. owner: of each body, as registered. Of others' bodies the sender has sold, and knows less by now.
+    void take(std::uint32_t worker, std::uint64_t step, NeighbourMessage&& message,
+              const std::vector<std::uint32_t>& owner);
     void keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed);
+    /// What a worker found in a step, beside what it has told of that.
+    void add(std::uint32_t worker, const FoundStep& found);
+    /// What this worker found at these bodies (ascending), its own and others, in the steps that it keeps.
+    [[nodiscard]] std::vector<FoundStep> found_at(const std::vector<int>& bodies) const;
+    /// A body that is there from the end of step `step` on; others may have told of it.
+    void born(const WorldRecord& record, std::uint64_t step);
     /// Sets the body's state at the end of step `step`, from the register or from here.
     void set(const WorldRecord& record, std::uint64_t step);
     /// Of a step; nullptr: not heard, or forgotten.
@@ -45,6 +54,9 @@ public:
     /// A ball that holds the body over the step after `now`.
     [[nodiscard]] ForeignBall ball(int body, std::uint64_t now);
     [[nodiscard]] bool known(int body) const { return newest_[static_cast<std::size_t>(body)].known; }
+    [[nodiscard]] bool asleep(int body) const {
+        return newest_[static_cast<std::size_t>(body)].glance.asleep;
+    }
     [[nodiscard]] std::uint64_t newest(int body) const {
         return newest_[static_cast<std::size_t>(body)].step;
     }  ///< step of what was told last
@@ -60,11 +72,15 @@ private:
         std::uint64_t step = 0;
         Update update;
     };
+    struct Glance {
+        Eigen::Vector3d position = Eigen::Vector3d::Zero(), velocity = position;  // [m], [m/s]
+        bool asleep = false, quarantined = false;
+    };
     struct Newest {
         std::uint64_t step = 0;
         std::uint32_t worker = kApplication;  // that told it; the application: see rest_
         bool known = false;
-        PackedUpdates::Glance glance = {};
+        Glance glance = {};
         std::size_t index = 0;  // in the message
         // Who told it before, up to which step.
         std::uint32_t worker_before = kApplication;
@@ -74,11 +90,11 @@ private:
         const Heard* heard = nullptr;
         std::size_t index = 0;  // of the body
     };
-    Heard& slot(std::uint32_t worker, std::uint64_t step);
-    void tell(int body, std::uint64_t step, std::uint32_t worker, const PackedUpdates::Glance& glance,
-              std::size_t index);
+    Heard* slot(std::uint32_t worker, std::uint64_t step);
+    void tell(int body, std::uint64_t step, std::uint32_t worker, const Glance& glance, std::size_t index);
     [[nodiscard]] Message last_until(int body, std::uint32_t worker, std::uint64_t from, std::uint64_t now,
                                      std::size_t index) const;
+    [[nodiscard]] static bool counts(const Told& rest, std::uint64_t step, std::uint64_t now);
     void find_told(int body, std::uint64_t now);
     void extrapolate(int body, std::uint64_t now);
 

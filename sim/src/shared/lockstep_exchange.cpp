@@ -37,11 +37,11 @@ public:
     void take(SnapshotMessage&& message) override;
     void members(const Members& message, std::uint32_t epoch) override;
     void members_within(const std::vector<std::uint32_t>& workers) override;
-    void own(const Ownership& ownership) override;
+    void own(const Ownership& ownership, std::uint32_t epoch) override;
     [[nodiscard]] bool owes() const override { return owes_; }
     [[nodiscard]] bool ready() const override;
     void step(const StepChannel& channel) override;
-    [[nodiscard]] std::vector<std::uint8_t> publish(std::uint32_t epoch, const StepReport& report) override;
+    void publish(std::uint32_t epoch, const StepReport& report) override;
     void follow() override;
     [[nodiscard]] Holdings holdings() override;
     [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
@@ -250,7 +250,9 @@ void LockstepExchange::wait_for_none() {
 
 void LockstepExchange::tell(const StepChannel& channel, std::vector<std::uint32_t> to, bool gave_up,
                             std::vector<std::uint8_t>&& bytes) {
-    channel.send(std::move(to), encode({self_, 0, replica_.step()}, PartMessage{gave_up, std::move(bytes)}));
+    if (!to.empty())
+        send_(std::move(to), encode({self_, 0, replica_.step()}, PartMessage{gave_up, std::move(bytes)}),
+              false);
     if (channel.flush) channel.flush(false);
 }
 
@@ -308,7 +310,7 @@ void LockstepExchange::take(SnapshotMessage&& message) {
     settle();
 }
 
-void LockstepExchange::own(const Ownership& ownership) {
+void LockstepExchange::own(const Ownership& ownership, std::uint32_t) {
     std::vector<std::uint32_t> bodies;
     for (const WorldRecord& record : ownership.bodies) {
         bodies.push_back(static_cast<std::uint32_t>(record.body));
@@ -376,7 +378,7 @@ void LockstepExchange::step(const StepChannel& channel) {
     unpublished_ = true;
 }
 
-std::vector<std::uint8_t> LockstepExchange::publish(std::uint32_t epoch, const StepReport& report) {
+void LockstepExchange::publish(std::uint32_t epoch, const StepReport& report) {
     const World& world = replica_.world();
     auto& states = std::get<StateMessage>(outgoing_);
     states.report = report;
@@ -390,9 +392,8 @@ std::vector<std::uint8_t> LockstepExchange::publish(std::uint32_t epoch, const S
     world.spring_records(states.springs);
     replica_.mark(replica_.step(), bodies);
     unpublished_ = owes_ = false;
-    std::vector<std::uint8_t> bytes = encode({self_, epoch, replica_.step()}, outgoing_);
+    send_({}, encode({self_, epoch, replica_.step()}, outgoing_), true);
     settle();
-    return bytes;
 }
 
 Holdings LockstepExchange::holdings() {

@@ -54,14 +54,14 @@ void Market::members(const std::vector<std::uint32_t>& workers) {
     if (!there(offer_.to)) sale_ = Sale::none;
 }
 
-void Market::heard(std::uint32_t worker, std::uint64_t step, std::uint32_t epoch, const StepReport& report) {
-    const auto found = workers_.find(worker);
-    if (found == workers_.end() || worker == self_) return;
+void Market::heard(const MessageHeader& header, double smoothed_s, std::uint32_t own) {
+    const auto found = workers_.find(header.worker);
+    if (found == workers_.end() || header.worker == self_) return;
     found->second.answers = true;
-    mark(found->second, step, report.smoothed_s);
-    if (epoch < found->second.epoch) return;
-    found->second.smoothed = report.smoothed_s;
-    found->second.own = static_cast<int>(report.own);
+    mark(found->second, header.step, smoothed_s);
+    if (header.epoch < found->second.epoch) return;
+    found->second.smoothed = smoothed_s;
+    found->second.own = static_cast<int>(own);
 }
 
 void Market::credit(Worker& worker, int bodies, double cost) {

@@ -43,8 +43,8 @@ public:
     Market(std::uint32_t self, const MarketSettings& settings, int bound);
 
     void members(const std::vector<std::uint32_t>& workers);  ///< sets the members
-    /// Takes another worker's report of its step `step`, written when it knew ownership up to `epoch`.
-    void heard(std::uint32_t worker, std::uint64_t step, std::uint32_t epoch, const StepReport& report);
+    /// Takes another worker's report of its step: the seconds of a step, the number of its bodies.
+    void heard(const MessageHeader& header, double smoothed_s, std::uint32_t own);
     void registered(std::uint32_t epoch, const Ownership& ownership);
     /// Takes own step `step`: its seconds, its work (World::work), the number of own bodies.
     void worked(std::uint64_t step, double seconds, double work, int own);
@@ -54,6 +54,12 @@ public:
     /// An offer of some of own lots, which are all that this worker has; none if no lot fits.
     [[nodiscard]] std::optional<Offer> make_offer(Holdings holdings);
     [[nodiscard]] bool is_selling() const { return sale_ != Sale::none; }  ///< an offer is under way
+    [[nodiscard]] bool is_sold() const {
+        return sale_ == Sale::accepted;
+    }  ///< what was offered; it is not handed over
+    [[nodiscard]] bool awaits_registration() const {
+        return handed_over_.has_value();
+    }  ///< of what was handed over
     /// Somebody owns nothing and was offered something: the next step is to wait for the answer, so that work is level after few
     /// steps, however long messages take. Not for that of a worker that has just joined: it may still be making its world.
     [[nodiscard]] bool awaits_answer() const {

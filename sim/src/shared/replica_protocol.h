@@ -7,10 +7,8 @@
 
 namespace sim {
 
-/// How a step that several do together tells and hears.
+/// How a step that several do together hears what others tell.
 struct StepChannel {
-    /// An encoded message to other workers.
-    std::function<void(std::vector<std::uint32_t>&& to, std::vector<std::uint8_t>&&)> send;
     /// Has what was sent go out; wait: and returns once something has come and was taken. Empty: this worker cannot wait within a
     /// step, so it does each alone.
     std::function<void(bool wait)> flush;
@@ -23,12 +21,28 @@ class ReplicaProtocol {
 public:
     virtual ~ReplicaProtocol() = default;
 
-    /// A state or update message of another worker, in the order in which that one sent them.
+    /// An encoded message to other workers, by way of the application or not; to none: to the application.
+    using Send = std::function<void(std::vector<std::uint32_t>&& to, std::vector<std::uint8_t>&&,
+                                    bool by_application)>;
+    /// How messages leave, to be set before anything else.
+    void send_by(Send send) { send_ = std::move(send); }
+    /// What another worker reports of a step, as its turn comes: its header, the seconds of a step, the number of its bodies.
+    using Report = std::function<void(const MessageHeader&, double smoothed_s, std::uint32_t own)>;
+    void report_to(Report report) { report_ = std::move(report); }
+
+    /// What another worker says of its steps, in the order in which it was sent, but where a way broke (bounded).
     virtual void take(const MessageHeader& header, StateMessage&& message) { (void)header, (void)message; }
     virtual void take(const MessageHeader& header, PublishedMessage&& message) {
         (void)header, (void)message;
     }
-    virtual void take(const MessageHeader& header, PackedUpdates&& message) { (void)header, (void)message; }
+    /// These come in any order, and over again. They throw PeerError, and nothing has happened, where a worker says what cannot be.
+    virtual void take(const MessageHeader& header, NeighbourMessage&& message) {
+        (void)header, (void)message;
+    }
+    virtual void take(const MessageHeader& header, FoundMessage&& message) { (void)header, (void)message; }
+    virtual void take(const MessageHeader& header, const HeardMessage& message) {
+        (void)header, (void)message;
+    }
     /// What another worker tells of a step that it does together with this one. May come within step().
     virtual void take(const MessageHeader& header, PartMessage&& message) { (void)header, (void)message; }
     virtual void members_within(const std::vector<std::uint32_t>& workers) {
@@ -40,9 +54,9 @@ public:
     /// The members now, and the epoch in which the application says so. Workers that left own nothing from here on;
     /// Ownership messages say who owns their bodies.
     virtual void members(const Members& message, std::uint32_t epoch) = 0;
-    /// Registered owners. Becomes effective at the message's step: this worker may have to publish its last step once more
-    /// (lockstep, owes()), or take bodies over that are some steps away (bounded).
-    virtual void own(const Ownership& ownership) = 0;
+    /// Registered owners, in this epoch. Becomes effective at the message's step: this worker may have to publish its last step once
+    /// more (lockstep, owes()), or take bodies over that are some steps away (bounded).
+    virtual void own(const Ownership& ownership, std::uint32_t epoch) = 0;
     /// Bodies came to this worker after its last step, which nobody has published of them.
     [[nodiscard]] virtual bool owes() const = 0;
 
@@ -51,14 +65,24 @@ public:
     [[nodiscard]] virtual bool ready() const = 0;
     /// Requires ready(). In lockstep with others, by the channel, if that can wait.
     virtual void step(const StepChannel& channel) = 0;
-    /// Message of the step just done: StateMessage or UpdateMessage, encoded. Called once after step(), and where it owes().
-    [[nodiscard]] virtual std::vector<std::uint8_t> publish(std::uint32_t epoch,
-                                                            const StepReport& report) = 0;
+    /// Sends the messages of the step just done. Called once after step(), and where it owes().
+    virtual void publish(std::uint32_t epoch, const StepReport& report) = 0;
     /// Without own bodies: advances as far as the others' messages allow.
     virtual void follow() = 0;
 
     /// Who has what where, for load balancing.
     [[nodiscard]] virtual Holdings holdings() = 0;
+    /// Bounded: whether what is own may be given: all is known that others found at it up to this step.
+    [[nodiscard]] virtual bool may_give() const { return true; }
+    /// Bounded: whether the others have heard all that was told, as far as they say; asks those once that have not.
+    [[nodiscard]] virtual bool all_have_heard() { return true; }
+    /// Bounded: asks the others for what this worker has not heard, and how far they have heard it.
+    virtual void ask_again() {}
+    /// Bounded: that another worker has done, as far as is known.
+    [[nodiscard]] virtual std::uint64_t steps_of(std::uint32_t worker) const {
+        (void)worker;
+        return 0;
+    }
     /// Stops owning: their exact records at the end of this worker's last step. The caller sends the
     /// Handover.
     [[nodiscard]] virtual Handover give(const std::vector<std::uint32_t>& bodies) = 0;
@@ -79,9 +103,19 @@ public:
     [[nodiscard]] virtual bool was_alone() const { return false; }
     [[nodiscard]] virtual const World& world() const = 0;
     virtual void use_threads(int threads) = 0;  ///< see World::use_threads
+
+protected:
+    Send send_;
+    Report report_;
 };
 
-/// No worker tells more parts of one step (PartMessage).
+/// Another worker says what cannot be. It came from that one itself: the application has not seen it.
+struct PeerError : DecodeError {
+    PeerError(std::uint32_t who, const std::string& what) : DecodeError(what), worker(who) {}
+    std::uint32_t worker;
+};
+
+/// No worker tells another more parts of one step, in lockstep.
 [[nodiscard]] std::size_t most_parts(const WorldScene& scene);
 
 [[nodiscard]] std::unique_ptr<ReplicaProtocol> make_lockstep_exchange(const SceneMessage& scene);

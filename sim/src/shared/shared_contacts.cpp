@@ -85,58 +85,42 @@ void SharedContacts::put_right(const CrossImpulse* found, const CrossImpulse* to
     if (body < world_->bodies()) world_->kick(body, linear, angular);
 }
 
-// What the owners of a body, then (`mine`) and of what it touched (`theirs`) found.
-void SharedContacts::compare(const std::vector<CrossImpulse>& mine, const std::vector<CrossImpulse>& theirs,
-                             const Occasion& of, int body) {
-    const auto own = std::ranges::equal_range(mine, body, {}, &CrossImpulse::own);
-    for (const CrossImpulse& found : own)
-        if (owner(found.ghost, of.step) == of.worker) put_right(&found, find(theirs, found.ghost, body), of);
-    for (const CrossImpulse& told : theirs)
-        if (told.ghost == body && !find(mine, body, told.own)) put_right(nullptr, &told, of);
+// What was found at an own body and at what it touched then.
+void SharedContacts::compare(const Occasion& of, int body) {
+    const ForeignBodies::Heard *mine = heard_->heard(self_, of.step),
+                               *theirs = heard_->heard(of.worker, of.step);
+    const std::vector<CrossImpulse>&here = mine ? mine->crossed : kNothing, &there = theirs->crossed;
+    for (const CrossImpulse& found : std::ranges::equal_range(here, body, {}, &CrossImpulse::own))
+        if (owner(found.ghost, of.step) == of.worker) put_right(&found, find(there, found.ghost, body), of);
+    for (const CrossImpulse& told : there)
+        if (told.ghost == body && !find(here, body, told.own)) put_right(nullptr, &told, of);
 }
 
 void SharedContacts::compare(std::uint32_t worker, std::uint64_t step, std::uint64_t now) {
     const ForeignBodies::Heard *theirs = heard_->heard(worker, step), *mine = heard_->heard(self_, step);
-    if (!theirs) return;
+    if (!theirs || !theirs->there) return;
     std::erase_if(sales_, [&](const Sale& sale) { return sale.step + keep_ < now; });
     touched_.clear();
     if (mine)
         for (const CrossImpulse& found : mine->crossed)
             if (owner(found.ghost, step) == worker) touched_.push_back(found.own);
-    for (const CrossImpulse& told : theirs->crossed)
-        if (owners_.own[static_cast<std::size_t>(told.ghost)] != 0) touched_.push_back(told.ghost);
-    for (const Sale& sale : sales_)
-        if (sale.step >= step) touched_.push_back(sale.body);
+    for (const CrossImpulse& told : theirs->crossed) touched_.push_back(told.ghost);
     std::ranges::sort(touched_);
     touched_.erase(std::unique(touched_.begin(), touched_.end()), touched_.end());
-    for (const int body : touched_) {
-        if (owners_.own[static_cast<std::size_t>(body)] == 0) continue;
-        const Sale* sale = sale_after(body, step);
-        if (sale && sale->before == worker) continue;  // within that worker
-        const ForeignBodies::Heard* then = sale ? heard_->heard(sale->before, step) : mine;
-        compare(then ? then->crossed : kNothing, theirs->crossed, {worker, step}, body);
-    }
+    for (const int body : touched_)
+        if (const auto at = static_cast<std::size_t>(body);
+            owners_.own[at] != 0 && owners_.awaits[at] == 0 && owner(body, step) == self_)
+            compare({worker, step}, body);
 }
 
 void SharedContacts::sold(int body, std::uint32_t before, std::uint64_t step) {
     sales_.push_back({body, before, step});
 }
 
-void SharedContacts::took(int body, const std::map<std::uint32_t, std::uint64_t>& compared) {
-    const auto sale = std::ranges::find(sales_.rbegin(), sales_.rend(), body, &Sale::body);
-    if (sale == sales_.rend()) return;
-    for (const auto& [worker, slots] : heard_->all()) {
-        const auto upto = compared.find(worker);
-        const std::uint64_t kept = sale->step > keep_ ? sale->step - keep_ : 0,
-                            from = std::max(kept, upto == compared.end() ? 0 : upto->second);
-        for (std::uint64_t step = from; step++ < sale->step;) {
-            const std::uint32_t before = owner(body, step);
-            const ForeignBodies::Heard *theirs = heard_->heard(worker, step),
-                                       *then = heard_->heard(before, step);
-            if (worker != before && theirs && then)
-                compare(then->crossed, theirs->crossed, {worker, step}, body);
-        }
-    }
+void SharedContacts::took(int body, std::uint32_t worker, std::uint64_t from, std::uint64_t until) {
+    for (std::uint64_t step = std::max(from, until > keep_ ? until - keep_ : 0); step++ < until;)
+        if (const ForeignBodies::Heard* theirs = heard_->heard(worker, step); theirs && theirs->there)
+            compare({worker, step}, body);
 }
 
 }  // namespace sim

@@ -21,12 +21,13 @@ namespace sim {
 /// rebound. It counts as who saw it first has it, of two in one step the owner of the body with the lower number;
 /// the other body is put right as a whole. A blow that one owner sees is the first one of the last `window` steps that the
 /// other one saw and that was not yet paired. If in a step only one of two finds a blow, that or the other's counts, as a whole. This follows from the messages of these steps alone, so whoever compares finds
-/// the same, also for a body that was just bought.
+/// the same; of a body that was just bought once it has heard what others found at it (FoundMessage).
 class SharedContacts {
 public:
-    /// own(body): whether this worker owns it. owner(body): who does, as registered.
+    /// By body: whether this worker owns it, and knows what others found at it; and who does, as registered.
     struct Owners {
         const std::vector<std::uint8_t>& own;
+        const std::vector<std::uint8_t>& awaits;  ///< it does not know that yet
         const std::vector<std::uint32_t>& owner;
     };
     SharedContacts(World& world, const ForeignBodies& heard, std::uint32_t self, Owners owners, int keep,
@@ -34,10 +35,12 @@ public:
 
     /// The own bodies and `worker` have done `step`: what both found is compared, once. `now`: steps done here.
     void compare(std::uint32_t worker, std::uint64_t step, std::uint64_t now);
+    /// Who did a body's step `step`, as far as is known.
+    [[nodiscard]] std::uint32_t owner(int body, std::uint64_t step) const;
     /// A body was sold by `before`; from the end of `step` on another owner has it.
     void sold(int body, std::uint32_t before, std::uint64_t step);
-    /// It has come here; `before` had compared what it found for it with each worker's up to `compared`.
-    void took(int body, const std::map<std::uint32_t, std::uint64_t>& compared);
+    /// All is known that `worker` found at a body that came here: it is compared for the steps after `from` up to `until`.
+    void took(int body, std::uint32_t worker, std::uint64_t from, std::uint64_t until);
 
 private:
     struct Sale {
@@ -57,11 +60,8 @@ private:
         std::uint64_t step;
     };
     void put_right(const CrossImpulse* found, const CrossImpulse* told, const Occasion& of);
-    void compare(const std::vector<CrossImpulse>& mine, const std::vector<CrossImpulse>& theirs,
-                 const Occasion& of, int body);
+    void compare(const Occasion& of, int body);
     [[nodiscard]] const Sale* sale_after(int body, std::uint64_t step) const;
-    [[nodiscard]] std::uint32_t owner(int body, std::uint64_t step) const;
-
     World* world_;
     const ForeignBodies* heard_;
     std::uint32_t self_;

@@ -35,6 +35,13 @@ SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
                      static_cast<std::uint64_t>(scene.settings.bound) + 1) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);
+    exchange_->send_by(
+        [this](std::vector<std::uint32_t>&& to, std::vector<std::uint8_t>&& bytes, bool by_application) {
+            queue_.push_back({std::move(to), std::move(bytes), by_application});
+        });
+    exchange_->report_to([this](const MessageHeader& header, double smoothed_s, std::uint32_t own) {
+        market_.heard(header, smoothed_s, own);
+    });
 }
 
 void SharedWorldWorker::take(const MessageHeader& header, WorkerMessage&& message) {
@@ -49,19 +56,19 @@ void SharedWorldWorker::take(const MessageHeader& header, WorkerMessage&& messag
 
 void SharedWorldWorker::take_message(const MessageHeader& header, Members&& message) {
     epoch_ = header.epoch;
+    market_.members(message.workers);
     exchange_->members(message, epoch_);
     std::erase_if(sellers_, [&message](const auto& seller) {
         return std::find(message.workers.begin(), message.workers.end(), seller.first) ==
                message.workers.end();
     });
-    market_.members(message.workers);
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, Ownership&& message) {
     epoch_ = header.epoch;
-    exchange_->own(message);
     market_.registered(header.epoch, message);
-    if (message.traded) sellers_.erase(message.from);
+    if (message.owner == self_) sellers_.erase(message.from);
+    exchange_->own(message, header.epoch);
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, SnapshotMessage&& message) {
@@ -85,23 +92,32 @@ void SharedWorldWorker::take_message(const MessageHeader& header, PartMessage&& 
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, StateMessage&& message) {
-    market_.heard(header.worker, header.step, header.epoch, message.report);
+    market_.heard(header, message.report.smoothed_s, message.report.own);
     exchange_->take(header, std::move(message));
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, PublishedMessage&& message) {
-    market_.heard(header.worker, header.step, header.epoch, message.report);
+    market_.heard(header, message.report.smoothed_s, message.report.own);
     exchange_->take(header, std::move(message));
 }
 
-void SharedWorldWorker::take_message(const MessageHeader& header, PackedUpdates&& message) {
-    market_.heard(header.worker, header.step, header.epoch, message.report);
+void SharedWorldWorker::take_message(const MessageHeader& header, NeighbourMessage&& message) {
     exchange_->take(header, std::move(message));
+}
+
+void SharedWorldWorker::take_message(const MessageHeader& header, FoundMessage&& message) {
+    exchange_->take(header, std::move(message));
+}
+
+void SharedWorldWorker::take_message(const MessageHeader& header, HeardMessage&& message) {
+    exchange_->take(header, message);
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, Offer&& message) {
     OfferAnswer answer = {header.worker, message.number, false};
-    if ((!draining_ || message.gathers) && !exchange_->at_end())
+    // Who has nothing begins where its first seller is, which others may be behind.
+    const bool begins = bounded_ && exchange_->has_nothing() && !sellers_.empty();
+    if ((!draining_ || message.gathers) && !exchange_->at_end() && !begins)
         answer = market_.answer(header.worker, message);
     if (answer.accepted && bounded_) sellers_[header.worker] = exchange_->steps_done() + 1;
     send(answer);
@@ -148,9 +164,21 @@ void SharedWorldWorker::take_message(const MessageHeader& header, Other&& messag
 
 bool SharedWorldWorker::ready() const {
     const bool bodies_are_due = std::ranges::any_of(
-        sellers_, [this](const auto& seller) { return seller.second <= exchange_->steps_done(); });
-    return !left_ && !ended_ && !stepping_ && !bodies_are_due && !market_.awaits_answer() &&
+        sellers_, [this](const auto& seller) { return last_before(seller) <= exchange_->steps_done(); });
+    return !left_ && !ended_ && !stepping_ && !bodies_are_due && !hands_over() && !market_.awaits_answer() &&
            exchange_->ready();
+}
+
+// The step that this worker does not pass before the bodies come that it bought.
+std::uint64_t SharedWorldWorker::last_before(
+    const std::pair<const std::uint32_t, std::uint64_t>& seller) const {
+    return std::max(seller.second, exchange_->steps_of(seller.first));
+}
+
+// It sold bodies, and is at the step at which they change owners.
+bool SharedWorldWorker::hands_over() const {
+    return bounded_ && (market_.awaits_registration() ||
+                        (market_.is_sold() && exchange_->steps_done() >= handover_step_));
 }
 
 std::string SharedWorldWorker::waits_for() const {
@@ -158,6 +186,7 @@ std::string SharedWorldWorker::waits_for() const {
     if (left_ || ended_) return "nobody any more";
     if (exchange_->own_bodies() == 0) return "bodies";
     if (market_.awaits_answer()) return "an answer to its offer";
+    if (hands_over()) return "the others, to hand bodies over";
     if (sellers_.empty()) return std::to_string(exchange_->lead()).append(" steps for the slowest");
     std::string who = "bodies from";
     for (const auto& [seller, step] : sellers_) who.append(" ").append(std::to_string(seller));
@@ -167,10 +196,7 @@ std::string SharedWorldWorker::waits_for() const {
 void SharedWorldWorker::step(const std::function<void(bool)>& flush) {
     lead_ = exchange_->lead();
     stepping_ = within_ = true;
-    exchange_->step({[this](std::vector<std::uint32_t>&& to, std::vector<std::uint8_t>&& bytes) {
-                         if (!to.empty()) queue_.push_back({std::move(to), std::move(bytes)});
-                     },
-                     flush});
+    exchange_->step({flush});
     within_ = false;
 }
 
@@ -210,7 +236,7 @@ void SharedWorldWorker::publish(const Times& times) {
     report.own = static_cast<std::uint32_t>(exchange_->own_bodies());
     report.outside_impulse = world.outside_impulse();
     report.mishaps = mishaps_of(world, exchange_->steps_done());
-    queue_.push_back({{}, exchange_->publish(epoch_, report)});
+    exchange_->publish(epoch_, report);
 }
 
 // Between steps, after states are on their way: one offer a step, and another when bodies are handed over. Who leaves offers whatever
@@ -241,7 +267,7 @@ std::optional<Offer> SharedWorldWorker::make_offer() {
 }
 
 bool SharedWorldWorker::hand_over() {
-    if (bounded_ && exchange_->steps_done() < handover_step_) return false;
+    if ((bounded_ && exchange_->steps_done() < handover_step_) || !exchange_->may_give()) return false;
     const std::optional<Offer> sold = market_.hand_over();
     if (!sold) return false;
     Handover handover = exchange_->give(sold->bodies);
@@ -259,9 +285,19 @@ void SharedWorldWorker::drain() {
 }
 
 // Bounded: all is sold, or there is nobody to sell to.
-bool SharedWorldWorker::may_leave() const {
-    return draining_ && bounded_ &&
-           (gives_up_ || (exchange_->has_nothing() && sellers_.empty() && !market_.is_selling()));
+bool SharedWorldWorker::may_leave() {
+    if (!draining_ || !bounded_ || gives_up_) return gives_up_;
+    if (!exchange_->has_nothing() || !sellers_.empty() || market_.is_selling() ||
+        market_.awaits_registration())
+        return false;
+    asks_if_heard_ = !stops_asking_ && !exchange_->all_have_heard();
+    return !asks_if_heard_;
+}
+
+void SharedWorldWorker::stop_waiting_for_answer() {
+    market_.stop_waiting();
+    stops_asking_ = asks_if_heard_;
+    if (!stepping_) trade();
 }
 
 // Bodies handed over without a buyer are distributed by the application.

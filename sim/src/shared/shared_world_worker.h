@@ -6,6 +6,9 @@
 
 namespace sim {
 
+/// How long a worker waits before it asks again, see SharedWorldWorker; then twice as long [s].
+constexpr double kAskAgain = 1;
+
 /// One worker, without clock or transport: the same code runs behind ZeroMQ and on simulated processors.
 ///
 ///   take() ... whenever a message comes, but between step() and worked() only in flush
@@ -14,8 +17,11 @@ namespace sim {
 class SharedWorldWorker {
 public:
     explicit SharedWorldWorker(const SceneMessage& scene);  ///< from the first message
+    SharedWorldWorker(const SharedWorldWorker&) = delete;
+    SharedWorldWorker& operator=(const SharedWorldWorker&) = delete;
 
-    /// Handles a message of the application or of another worker, decoded. Throws DecodeError if it is inconsistent.
+    /// Handles a message of the application or of another worker, decoded. Throws DecodeError if it is inconsistent; as PeerError, if it
+    /// came from another worker, which the caller may then hear no more.
     void take(const MessageHeader& header, WorkerMessage&& message);
     [[nodiscard]] bool ready() const;
     /// flush(wait): called where the step tells others, and where it needs what they tell. Sends outgoing(); wait: and
@@ -23,9 +29,12 @@ public:
     void step(const std::function<void(bool wait)>& flush = {});
     void use_threads(int threads) { exchange_->use_threads(threads); }  ///< see World::use_threads
     void stop_waiting() { exchange_->members_within({}); }  ///< within flush: the step is done alone
-    /// Whether only the answer to an offer keeps the next step from being done; and then it can be done without.
-    [[nodiscard]] bool awaits_answer() const { return market_.awaits_answer(); }
-    void stop_waiting_for_answer() { market_.stop_waiting(); }
+    /// Whether only an answer of another worker keeps this one from going on, to an offer, or, before it leaves, that it has heard all;
+    /// and then it can go on without.
+    [[nodiscard]] bool awaits_answer() const { return market_.awaits_answer() || asks_if_heard_; }
+    void stop_waiting_for_answer();
+    /// Where it has been waiting for kAskAgain: something may have been lost on its way.
+    void ask_again() { exchange_->ask_again(); }
     struct Times {  ///< of a step, see WorkerStep
         double seconds = 0, waited_s = 0, processor_s = 0;
         std::uint64_t linked = 0;  ///< bytes that were sent to other workers directly, since the step before
@@ -35,6 +44,7 @@ public:
     struct Outgoing {
         std::vector<std::uint32_t> to;  ///< workers; empty: to the application
         std::vector<std::uint8_t> bytes;
+        bool by_application = true;  ///< also to workers that can be reached, see relayed
     };
     /// Encoded messages, in order; empties the queue.
     [[nodiscard]] std::vector<Outgoing> outgoing();
@@ -64,7 +74,9 @@ private:
     void take_message(const MessageHeader& header, PublishedMessage&& message);
     void take_message(const MessageHeader& header, PartMessage&& message);
     void take_within(const MessageHeader& header, WorkerMessage&& message);
-    void take_message(const MessageHeader& header, PackedUpdates&& message);
+    void take_message(const MessageHeader& header, NeighbourMessage&& message);
+    void take_message(const MessageHeader& header, FoundMessage&& message);
+    void take_message(const MessageHeader& header, HeardMessage&& message);
     void take_message(const MessageHeader& header, Offer&& message);
     void take_message(const MessageHeader& header, OfferAnswer&& message);
     void take_message(const MessageHeader& header, Gather&& message);
@@ -77,7 +89,10 @@ private:
     void send(const WorkerMessage& message);
     void publish(const Times& times);
     void trade();
-    [[nodiscard]] bool may_leave() const;
+    [[nodiscard]] bool may_leave();
+    [[nodiscard]] bool hands_over() const;
+    [[nodiscard]] std::uint64_t last_before(
+        const std::pair<const std::uint32_t, std::uint64_t>& seller) const;
     [[nodiscard]] std::optional<Offer> make_offer();
     [[nodiscard]] bool hand_over();
     void leave();
@@ -95,7 +110,7 @@ private:
     // step: the one after the buyer's. The buyer waits there; the seller goes on to it.
     std::uint64_t handover_step_ = 0;
     std::optional<std::uint64_t> offered_at_;  // step
-    // Whose offers were accepted and whose bodies have not come; the step up to which this worker goes on.
+    // Whose offers were accepted and whose bodies have not come; the step up to which this worker goes on, or up to where they are.
     std::map<std::uint32_t, std::uint64_t> sellers_;
     struct Asked {
         std::uint64_t step;  // of the application's view
@@ -109,6 +124,8 @@ private:
     std::vector<Deferred> deferred_;  // came within a step
     bool within_ = false, stepping_ = false, draining_ = false, gives_up_ = false, left_ = false,
          ended_ = false;
+    bool asks_if_heard_ = false,
+         stops_asking_ = false;  // before it leaves, whether the others have heard all
 };
 
 }  // namespace sim

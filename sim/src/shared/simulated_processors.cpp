@@ -141,7 +141,7 @@ double cost_of(const std::function<void()>& work) {
 void handle(std::unique_ptr<SharedWorldWorker>& worker, const Turn& turn) {
     if (turn.ended) worker->worked(*turn.ended);
     for (const Bytes& bytes : turn.messages) {
-        DecodedMessage decoded = decode_for_worker(*bytes);
+        DecodedMessage decoded = decode_message(*bytes);
         if (const auto* scene = std::get_if<SceneMessage>(&decoded.message)) {
             worker = std::make_unique<SharedWorldWorker>(*scene);
         } else if (worker) {
@@ -233,7 +233,8 @@ void Machine::join() {
 // What the application sends arrives half a latency later, as what was sent to it: both are between two workers.
 void Machine::deliver() {
     for (const Coordinator::Outgoing& message : meeting_.outgoing())
-        for (const std::uint32_t to : message.to) put(to, now_ + how_.latency_s / 2, message.bytes);
+        for (const std::uint32_t to : message.to)
+            put(to, now_ + how_.latency_s / 2 + how_.by_application_s, message.bytes);
 }
 
 void Machine::put(std::uint32_t to, double time, const Bytes& bytes) {
@@ -251,7 +252,8 @@ void Machine::hand_on(std::size_t from) {
         meeting_.take(static_cast<std::uint32_t>(from), *message.bytes);
         meeting_.advance();
     }
-    for (const std::uint32_t to : message.to) put(to, now_ + how_.latency_s / 2, message.bytes);
+    for (const std::uint32_t to : message.to)
+        put(to, now_ + how_.latency_s / 2 + how_.directly_s, message.bytes);
 }
 
 Machine::Event Machine::next() const {
@@ -270,7 +272,7 @@ Machine::Event Machine::next() const {
         if (!p.outbox.empty()) offer(Event::Kind::message, p.outbox.front().time, i);
         if (!p.runs()) continue;
         const bool startable = p.worker && p.worker->ready();
-        if (!p.step->waits() && (p.stepping || p.drain || startable)) {
+        if (!p.step->waits() && (p.stepping || (p.drain && p.worker) || startable)) {
             offer(Event::Kind::worker, p.free_at, i);
         } else if (!p.inbox.empty()) {
             offer(Event::Kind::worker, std::max(p.free_at, p.inbox.front().time), i);
@@ -364,7 +366,7 @@ void Machine::start_step(std::size_t number) {
             if (!wait) return;
             step.wait();
             for (const Bytes& bytes : own.come) {
-                DecodedMessage decoded = decode_for_worker(*bytes);
+                DecodedMessage decoded = decode_message(*bytes);
                 own.worker->take(decoded.header, std::move(decoded.message));
             }
         });
@@ -407,6 +409,8 @@ void Machine::send(Processor& p) {
     if (!p.worker) return;
     for (SharedWorldWorker::Outgoing& message : p.worker->outgoing()) {
         p.sent += message.bytes.size();
+        if (!message.to.empty() && message.by_application)
+            message.bytes = p.worker->relayed(std::exchange(message.to, {}), std::move(message.bytes));
         p.linked += message.to.size() * message.bytes.size();
         if (p.cut) continue;
         p.outbox.push_back({p.free_at + how_.latency_s / 2,
@@ -437,7 +441,7 @@ double Machine::repeat_alone(const Processor& p) const {
                 if (!wait) return;
                 if (next == turn.within.size()) throw Unended{};
                 for (const Bytes& bytes : turn.within[next++]) {
-                    DecodedMessage decoded = decode_for_worker(*bytes);
+                    DecodedMessage decoded = decode_message(*bytes);
                     worker->take(decoded.header, std::move(decoded.message));
                 }
             });

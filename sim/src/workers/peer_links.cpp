@@ -263,19 +263,31 @@ void PeerLinks::take(const zmq::message_t& preamble, const zmq::message_t& messa
     try {
         read(worker, peer, message);
     } catch (const DecodeError& wrong) {
-        ++refused_;
-        std::fprintf(stderr, "worker: worker %u is heard no more on its link: %s\n", worker, wrong.what());
-        peer.closed = true;
-        miss(worker, peer, peer.step);
+        close(worker, wrong.what());
     }
-    if (first || peer.closed) beat(peer);
+    if (first && !peer.closed) beat(peer);
+}
+
+void PeerLinks::close(std::uint32_t worker, const std::string& why) {
+    const auto found = peers_.find(worker);
+    if (found == peers_.end() || std::exchange(found->second.closed, true)) return;
+    ++refused_;
+    std::fprintf(stderr, "worker: worker %u is heard no more on its link: %s\n", worker, why.c_str());
+    miss(worker, found->second, found->second.step);
+    beat(found->second);
+}
+
+bool PeerLinks::is_told(const WorkerMessage& message) const {
+    if (settings_.pace == Pace::lockstep) return std::holds_alternative<PartMessage>(message);
+    if (const auto* heard = std::get_if<HeardMessage>(&message)) return !heard->again;
+    return std::holds_alternative<NeighbourMessage>(message) || std::holds_alternative<FoundMessage>(message);
 }
 
 void PeerLinks::read(std::uint32_t worker, Peer& peer, const zmq::message_t& message) {
     DecodedMessage m = decode_message({message.data<std::uint8_t>(), message.size()});
     const auto* beats = std::get_if<LinkBeat>(&m.message);
-    if (m.header.worker != worker || (!beats && !std::holds_alternative<PartMessage>(m.message)))
-        throw DecodeError("found what no worker tells another, expected a part or a beat");
+    if (m.header.worker != worker || (!beats && !is_told(m.message)))
+        throw DecodeError("found what no worker tells another, expected a message of a step or a beat");
     if (beats) {
         peer.hears_this = beats->hears;
         if (peer.lost) miss(worker, peer, peer.step);  // of what somebody may be waiting for
@@ -283,16 +295,17 @@ void PeerLinks::read(std::uint32_t worker, Peer& peer, const zmq::message_t& mes
     }
     const std::uint64_t step = m.header.step;
     if (step < peer.step || step > settings_.steps)
-        throw DecodeError("found a part of step " + std::to_string(step) + ", expected one of " +
+        throw DecodeError("found a message of step " + std::to_string(step) + ", expected one of " +
                           std::to_string(peer.step) + " to " + std::to_string(settings_.steps));
     if (std::exchange(peer.step, step) != step) peer.parts = 0;
-    if (++peer.parts > 2 * settings_.most_parts) throw DecodeError("found more parts than a step needs");
+    if (++peer.parts > 2 * settings_.most_parts) throw DecodeError("found more messages than a step needs");
     if (std::exchange(peer.lost, false)) miss(worker, peer, step);
     if (step >= peer.skip_until) heard_.push_back(std::move(m));
 }
 
 // Something of this step, the one before or the next one.
 void PeerLinks::miss(std::uint32_t worker, Peer& peer, std::uint64_t step) {
+    if (settings_.pace == Pace::bounded) return;
     for (const std::uint64_t after : {0, 1, 2})
         if (step + after > 0) heard_.push_back({{worker, 0, step + after - 1}, PartMessage{true, {}}});
     peer.skip_until = step + 2;

@@ -22,11 +22,12 @@ namespace sim {
 ///
 /// A link serves while the other one says that it hears (LinkBeat), and was heard itself not long ago, or before a step that took
 /// longer: so a worker that cannot be reached in one direction is told by way of the application. That is decided once a step, so
-/// that what is told of a step comes one way, in order. Where a count is missed something is lost: of the step in which that
-/// shows no more is taken from this worker, but that it gave up.
+/// that what is told of a step comes one way, in order. Where a count is missed something is lost: in lockstep of the step in which
+/// that shows no more is taken from this worker, but that it gave up; in bounded pace the messages tell it themselves.
 ///
-/// Bad peers: a message without the right secret is dropped. Who sends what is no part or beat, parts of steps that are over or after
-/// the last, or more parts of one step than steps need, is heard no more on this link, and has to tell by way of the application.
+/// Bad peers: a message without the right secret is dropped. Who sends what no worker tells another in this pace, messages of steps
+/// that are over or after the last, or more of one step than steps need, is heard no more on this link, and has to tell by way of the
+/// application.
 /// No message is larger than `largest`; kMostPartsWaiting of each connection wait, then it is held back. Over TCP as many connections
 /// are taken as Listening allows.
 class PeerLinks {
@@ -34,10 +35,11 @@ public:
     using Clock = std::chrono::steady_clock;
     struct Settings {
         std::uint32_t self = 0;
+        Pace pace = Pace::lockstep;
         std::string application;         ///< its endpoint
         std::optional<WorkerKeys> keys;  ///< of this worker; with them links are encrypted
         std::int64_t largest = 0;        ///< message [bytes]
-        std::size_t most_parts = 0;      ///< that one worker tells of a step
+        std::size_t most_parts = 0;      ///< messages that one worker tells of a step
         std::uint64_t steps = 0;         ///< of the run
     };
     /// Listens beside the application's socket in its private folder, or, over TCP, at the address by which this machine
@@ -58,8 +60,10 @@ public:
     /// Sends to those that are told directly; returns the others.
     [[nodiscard]] std::vector<std::uint32_t> send(const std::vector<std::uint32_t>& to,
                                                   const std::vector<std::uint8_t>& bytes);
-    [[nodiscard]] std::optional<DecodedMessage> receive(Clock::time_point now);  ///< a part
-    [[nodiscard]] void* handle() { return listens_.handle(); }                   ///< to poll
+    [[nodiscard]] std::optional<DecodedMessage> receive(Clock::time_point now);  ///< what one tells of a step
+    /// It told what cannot be: it is heard no more.
+    void close(std::uint32_t worker, const std::string& why);
+    [[nodiscard]] void* handle() { return listens_.handle(); }  ///< to poll
 
     [[nodiscard]] bool is_up(std::uint32_t worker) const;
     [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }  ///< messages
@@ -87,6 +91,7 @@ private:
     void beat(Peer& peer);
     void take(const zmq::message_t& preamble, const zmq::message_t& message, Clock::time_point now);
     void read(std::uint32_t worker, Peer& peer, const zmq::message_t& message);
+    [[nodiscard]] bool is_told(const WorkerMessage& message) const;
     void miss(std::uint32_t worker, Peer& peer, std::uint64_t step);
 
     Settings settings_;

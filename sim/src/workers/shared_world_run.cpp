@@ -35,9 +35,10 @@ public:
     WorkerHere(std::uint32_t number) : number_(number) {}
     [[nodiscard]] std::uint32_t number() const { return number_; }
 
+    /// Throws PeerError, where another worker told what cannot be.
     void take(const std::vector<std::uint8_t>& bytes) {
         const double processor = thread_processor_s();
-        DecodedMessage m = decode_for_worker(bytes);
+        DecodedMessage m = decode_message(bytes);
         if (const auto* scene = std::get_if<SceneMessage>(&m.message))
             worker_.emplace(*scene);
         else if (worker_)
@@ -49,8 +50,14 @@ public:
         if (!worker_ || worker_->ended()) return false;
         if (worker_->awaits_answer())
             worker_->stop_waiting_for_answer();  // messages come between its steps alone
-        if (!worker_->ready()) return false;
-        const Clock::time_point start = Clock::now();
+        if (!worker_->ready()) {
+            if (seconds_since(worked_) < ask_after_) return false;
+            worked_ = Clock::now(), ask_after_ *= 2;
+            worker_->ask_again();
+            return false;
+        }
+        const Clock::time_point start = worked_ = Clock::now();
+        ask_after_ = kAskAgain;
         const double processor = thread_processor_s();
         worker_->step();
         const double spent = std::exchange(messages_s_, 0) + thread_processor_s() - processor;
@@ -72,6 +79,8 @@ private:
     std::uint32_t number_;
     std::optional<SharedWorldWorker> worker_;
     double messages_s_ = 0;  ///< processor time that they took since the last step
+    Clock::time_point worked_ = Clock::now();
+    double ask_after_ = kAskAgain;  ///< [s]
 };
 
 class SharedWorldRun {
@@ -152,9 +161,11 @@ private:
     void look_after_progress() {
         // Who has just got the bodies of a lost one has as long as that one had.
         const std::pair now(meeting_.steps(), meeting_.result().bodies_reowned);
-        if (std::exchange(progress_, now) != now) progressed_ = Clock::now();
+        if (std::exchange(progress_, now) != now) progressed_ = Clock::now(), waiting_noted_ = false;
+        if (seconds_since(progressed_) > launch_.longest_step_s / 2 && !std::exchange(waiting_noted_, true))
+            meeting_.note_waiting();
         if (seconds_since(progressed_) < launch_.longest_step_s) return;
-        progressed_ = Clock::now();
+        progressed_ = Clock::now(), waiting_noted_ = false;
         meeting_.lose_slowest("all have waited for its bodies for " + seconds(launch_.longest_step_s));
     }
 
@@ -263,7 +274,11 @@ private:
     }
 
     void deliver(Coordinator::Outgoing& out) {
-        if (here_ && std::erase(out.to, here_->number()) > 0) here_->take(*out.bytes);
+        if (here_ && std::erase(out.to, here_->number()) > 0) try {
+                here_->take(*out.bytes);
+            } catch (const PeerError& wrong) {
+                meeting_.lose(wrong.worker, std::string("it told another what cannot be: ") + wrong.what());
+            }
         teams_.address(out);
         if (!out.to.empty()) gate_.send(out.to, std::move(out.bytes));
     }
@@ -295,6 +310,7 @@ private:
     bool started_ = false;
     std::pair<std::uint64_t, int> progress_;  ///< steps, bodies that went to others after losses
     Clock::time_point progressed_ = Clock::now();
+    bool waiting_noted_ = false;  // since then
     bool noted_ = false;
     std::vector<Child> children_;  // last: processes end before the gate goes
 };

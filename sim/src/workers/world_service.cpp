@@ -25,6 +25,7 @@ constexpr int kPollMs = 50;
 constexpr std::size_t kMostPartsInOneGo = 4096;
 constexpr double kLongestWithin = 2;       // that a step waits for others [s]; then it is done alone
 constexpr double kLongestForAnswer = 0.5;  // that the next step waits for the answer to an offer [s]
+constexpr double kLongestToLeave = 3;      // that who leaves waits until others have heard all [s]
 
 volatile std::sig_atomic_t drain_asked = 0;
 
@@ -35,6 +36,12 @@ void listen_for_drain() {
     action.sa_flags = static_cast<int>(SA_RESETHAND);
     sigaction(SIGTERM, &action, nullptr);
     sigaction(SIGINT, &action, nullptr);
+}
+
+/// Messages that one worker tells another of a step, at most. In bounded pace who has nothing, and does no steps, tells of sales.
+std::size_t most_told(const SceneMessage& scene) {
+    constexpr std::size_t kMostOfSales = 1 << 16;
+    return scene.settings.pace == Pace::lockstep ? most_parts(scene.scene) : kMostOfSales;
 }
 
 /// Sleeps through a signal too.
@@ -49,12 +56,13 @@ public:
           pulse_(link.pulse),
           threads_(link.threads),
           worker_(scene),
-          header_{scene.worker, 0, 0} {
+          header_{scene.worker, 0, 0},
+          bounded_(scene.settings.pace == Pace::bounded) {
         worker_.use_threads(threads_);
-        if (scene.settings.pace != Pace::lockstep || !scene.settings.together) return;
-        links_.emplace(link.context, PeerLinks::Settings{scene.worker, link.endpoint, link.keys,
-                                                         largest_message(scene.scene),
-                                                         most_parts(scene.scene), scene.settings.steps});
+        if (scene.settings.pace == Pace::lockstep && !scene.settings.together) return;
+        links_.emplace(link.context, PeerLinks::Settings{scene.worker, scene.settings.pace, link.endpoint,
+                                                         link.keys, largest_message(scene.scene),
+                                                         most_told(scene), scene.settings.steps});
         if (links_->reach()) send(encode(header_, *links_->reach()));
     }
 
@@ -75,6 +83,7 @@ private:
             take_all();
             if (drain_asked && !std::exchange(draining_, true)) worker_.drain();
             look_after_offer();
+            look_after_others();
             if (!worker_.ended() && worker_.ready()) step();
             send_all();
             if (worker_.left()) return 0;
@@ -89,29 +98,44 @@ private:
             offered_since_.reset();
         else if (!offered_since_)
             offered_since_ = Clock::now();
-        else if (seconds_since(*offered_since_) > kLongestForAnswer)
+        else if (seconds_since(*offered_since_) > (draining_ ? kLongestToLeave : kLongestForAnswer))
             worker_.stop_waiting_for_answer();
+    }
+    /// What they told may have been lost, or a link may be cut. (Or a step takes long: then the next message goes by the application.)
+    void look_after_others() {
+        const Clock::time_point now = Clock::now();
+        if (idle_since_ > asked_) ask_after_ = kAskAgain;
+        if (worker_.ready() || seconds_since(std::max(idle_since_, asked_)) < ask_after_) return;
+        asked_ = now, ask_after_ *= 2;
+        if (links_) links_->doubt(now), links_->begin_step();
+        worker_.ask_again();
     }
     void take_all() {
         zmq::message_t frame;
         while (through_signals([&] { return socket_.recv(frame, zmq::recv_flags::dontwait); })) {
             const auto* bytes = frame.data<std::uint8_t>();
-            DecodedMessage m = decode_for_worker({bytes, frame.size()});
+            DecodedMessage m = decode_message({bytes, frame.size()});
             if (const auto* refusal = std::get_if<Refusal>(&m.message)) {
                 std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
                 refused_ = true;
             }
             if (links_) follow(m.message);
-            if (!std::holds_alternative<PeersMessage>(m.message))
-                worker_.take(m.header, std::move(m.message));
+            if (!std::holds_alternative<PeersMessage>(m.message)) take(std::move(m));
         }
         // A bounded number, so that who floods does not hold this up.
         for (std::size_t i = 0; links_ && i < kMostPartsInOneGo; ++i) {
             std::optional<DecodedMessage> part = links_->receive(Clock::now());
             if (!part) break;
-            worker_.take(part->header, std::move(part->message));
+            take(std::move(*part));
         }
         if (links_) links_->look(Clock::now());
+    }
+    void take(DecodedMessage&& m) {
+        try {
+            worker_.take(m.header, std::move(m.message));
+        } catch (const PeerError& wrong) {
+            links_->close(wrong.worker, wrong.what());
+        }
     }
     /// What the application says of the other workers.
     void follow(const WorkerMessage& message) {
@@ -150,12 +174,13 @@ private:
         worker_.stop_waiting();
     }
     void send_all() {
+        if (links_ && bounded_) links_->begin_step();  // messages have numbers: each may go either way
         for (SharedWorldWorker::Outgoing& message : worker_.outgoing()) {
             if (message.to.empty()) {
                 send(message.bytes);
                 continue;
             }
-            if (links_) message.to = links_->send(message.to, message.bytes);
+            if (links_ && !message.by_application) message.to = links_->send(message.to, message.bytes);
             if (!message.to.empty()) send(worker_.relayed(std::move(message.to), std::move(message.bytes)));
         }
     }
@@ -179,12 +204,13 @@ private:
     Pulse& pulse_;
     int threads_;  ///< of a step
     SharedWorldWorker worker_;
-    std::optional<PeerLinks> links_;  ///< in lockstep
+    std::optional<PeerLinks> links_;  ///< none with --verify
     std::uint64_t told_linked_ = 0;   ///< of what was sent on them [bytes]
     MessageHeader header_;
-    bool draining_ = false, refused_ = false;
+    bool bounded_, draining_ = false, refused_ = false;
     double waited_within_ = 0;  ///< the step under way
-    Clock::time_point idle_since_ = Clock::now();
+    Clock::time_point idle_since_ = Clock::now(), asked_ = idle_since_;
+    double ask_after_ = kAskAgain;                    ///< [s]; twice as long each time
     std::optional<Clock::time_point> offered_since_;  ///< the offer whose answer the next step waits for
     double told_processor_ = processor_s();
 };

@@ -224,6 +224,11 @@ double World::most_radius(int body) const {
     return kind.surface.bounding_radius() * (kind.modes > 0 ? 1 + kGradientLimit : 1);
 }
 
+double World::radius_now(int body) const {
+    const MovingBody& b = implementation_->bodies.at(static_cast<std::size_t>(body));
+    return loose_radius(*b.kind, b.state.q);
+}
+
 bool World::Implementation::near_own(const Eigen::Vector3d& center, double radius) const {
     return std::any_of(own_balls.begin(), own_balls.end(), [&](const LooseBall& ball) {
         const double reach = ball.radius + radius;

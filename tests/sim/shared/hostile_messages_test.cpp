@@ -18,8 +18,9 @@ namespace {
 
 class Damage : public testing::TestWithParam<Pace> {};
 
-// Three workers, of which the first lies; the others have to finish with every body.
-void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
+// Three workers, of which the first lies; the others have to finish with every body. linked: they tell each other directly, until
+// one of them tells another what cannot be; from then on it goes by way of the application, as on links.
+void run_with_a_liar(Pace pace, unsigned seed, int messages, bool linked, int& sent) {
     DistributedSettings settings;
     settings.pace = pace;
     settings.bound = pace == Pace::bounded ? 2 : 0;
@@ -32,7 +33,7 @@ void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
     auto deliver = [&] {
         for (const Coordinator::Outgoing& out : meeting.outgoing())
             for (const std::uint32_t to : out.to) {
-                DecodedMessage message = decode_for_worker(*out.bytes);
+                DecodedMessage message = decode_message(*out.bytes);
                 if (const auto* scene = std::get_if<SceneMessage>(&message.message))
                     workers[to] = std::make_unique<SharedWorldWorker>(*scene);
                 else if (workers.count(to) > 0)
@@ -42,10 +43,23 @@ void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
     deliver();
     meeting.start();
     int damaged = 0, idle = 0;
+    std::set<std::pair<std::uint32_t, std::uint32_t>> closed;  // links, by sender
+    const auto tell = [&](std::uint32_t from, std::uint32_t to, const std::vector<std::uint8_t>& bytes) {
+        try {
+            DecodedMessage message = decode_message(bytes);
+            if (message.header.worker != from) throw DecodeError("found another worker's number");
+            workers.at(to)->take(message.header, std::move(message.message));
+        } catch (const DecodeError& wrong) {  // or PeerError
+            EXPECT_EQ(from, 0u) << wrong.what();
+            closed.insert({from, to});
+        }
+    };
     for (int turn = 0; turn < 2000 && !meeting.finished(); ++turn) {
         deliver();
         // As the application does after 30 s.
         if (++idle > 20) meeting.lose_slowest("nothing was published"), idle = 0;
+        for (auto& [number, worker] : workers)
+            if (linked && idle > 5 && meeting.is_member(number)) worker->ask_again();
         for (auto& [number, worker] : workers) {
             if (worker->ready()) {
                 worker->step();
@@ -53,28 +67,143 @@ void run_with_a_liar(Pace pace, unsigned seed, int messages, int& sent) {
                 idle = 0;
             }
             for (SharedWorldWorker::Outgoing& message : worker->outgoing()) {
-                std::vector<std::uint8_t> bytes =
-                    message.to.empty() ? message.bytes : worker->relayed(message.to, message.bytes);
+                const bool direct =
+                    linked && !message.by_application && !closed.contains({number, message.to[0]});
+                std::vector<std::uint8_t> bytes = direct ? message.bytes
+                                                  : message.to.empty()
+                                                      ? message.bytes
+                                                      : worker->relayed(message.to, message.bytes);
                 const bool lies = number == 0 && turn > 5 && damaged < messages && random() % 4 == 0;
                 for (unsigned n = lies ? 1 + random() % 3 : 0; n > 0; --n)
                     bytes[12 + random() % (bytes.size() - 16)] = static_cast<std::uint8_t>(random());
                 if (lies) sim_test::seal(bytes), ++damaged;
-                meeting.take(number, bytes);
-                meeting.advance();
+                if (direct)
+                    tell(number, message.to[0], bytes);
+                else
+                    meeting.take(number, bytes), meeting.advance();
             }
         }
     }
     sent += damaged;
     EXPECT_TRUE(meeting.finished()) << "seed " << seed << ": " << record.notes;
     EXPECT_EQ(meeting.result().steps, 60u) << "seed " << seed;
+    if (linked) {
+        EXPECT_TRUE(meeting.is_member(1) && meeting.is_member(2)) << "seed " << seed << ": " << record.notes;
+    }
 }
 
 TEST_P(Damage, OfAMembersMessagesCrashesNobodyAndTheOthersFinish) {
     const int runs = std::getenv("MUSICWORLD_LONG") ? 2000 : 60;
     int sent = 0;
     for (int seed = 0; seed < runs; ++seed)
-        run_with_a_liar(GetParam(), static_cast<unsigned>(seed), 20, sent);
+        run_with_a_liar(GetParam(), static_cast<unsigned>(seed), 20, false, sent);
     EXPECT_GT(sent, runs / 2);
+}
+
+TEST(DamageOnLinks, OfAMembersMessagesCrashesNobodyAndTheOthersFinish) {
+    const int runs = std::getenv("MUSICWORLD_LONG") ? 2000 : 60;
+    int sent = 0;
+    for (int seed = 0; seed < runs; ++seed)
+        run_with_a_liar(Pace::bounded, static_cast<unsigned>(seed), 20, true, sent);
+    EXPECT_GT(sent, 4 * runs);
+}
+
+/// Three workers in bounded pace. passes: whether a message from one to another comes, directly or by way of the application.
+struct Three {
+    using Workers = std::map<std::uint32_t, std::unique_ptr<SharedWorldWorker>>;
+    template <typename Passes>
+    void run(Passes passes) {
+        DistributedSettings settings;
+        settings.pace = Pace::bounded, settings.bound = 2, settings.steps = 60;
+        settings.market.from_step = 5;
+        Coordinator meeting(world_test::busy_scene(), settings, record);
+        for (int i = 0; i < 3; ++i) (void)meeting.join({});
+        meeting.start();
+        int idle = 0;
+        for (int turn = 0; turn < 4000 && !meeting.finished(); ++turn) {
+            for (const Coordinator::Outgoing& out : meeting.outgoing())
+                for (const std::uint32_t to : out.to) {
+                    DecodedMessage m = decode_message(*out.bytes);
+                    if (const auto* scene = std::get_if<SceneMessage>(&m.message))
+                        workers[to] = std::make_unique<SharedWorldWorker>(*scene);
+                    else
+                        workers.at(to)->take(m.header, std::move(m.message));
+                }
+            // As the application does after 30 s, and workers after one.
+            if (idle == 20) meeting.note_waiting();
+            if (++idle > 40) meeting.lose_slowest("nothing was published"), idle = 0;
+            for (auto& [number, worker] : workers) {
+                if (idle % 10 == 9 && meeting.is_member(number)) worker->ask_again();
+                if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3}), idle = 0;
+                for (SharedWorldWorker::Outgoing& out : worker->outgoing()) {
+                    const bool says_nothing =
+                        out.by_application && !out.to.empty() &&
+                        !passes(number, out.to[0], decode_message(out.bytes).message, false);
+                    if (says_nothing) continue;
+                    if (out.to.empty() || out.by_application) {
+                        meeting.take(number, out.to.empty() ? out.bytes : worker->relayed(out.to, out.bytes));
+                        meeting.advance();
+                        continue;
+                    }
+                    for (const std::uint32_t to : out.to) {
+                        DecodedMessage m = decode_message(out.bytes);
+                        if (meeting.is_member(to) && passes(number, to, m.message, true))
+                            workers.at(to)->take(m.header, std::move(m.message));
+                    }
+                }
+                more(meeting, number, *worker);
+            }
+        }
+        EXPECT_TRUE(meeting.finished()) << record.notes;
+        for (std::uint32_t worker = 0; worker < 3; ++worker)
+            if (meeting.is_member(worker)) members.push_back(worker);
+    }
+    std::function<void(Coordinator&, std::uint32_t, SharedWorldWorker&)> more =
+        [](Coordinator&, std::uint32_t, SharedWorldWorker&) {};
+    world_test::Record record;
+    Workers workers;
+    std::vector<std::uint32_t> members;  // in the end
+};
+
+// It publishes its steps, and so is not the slowest.
+TEST(Silence, WhoTellsOneOtherNothingIsGivenUpAndNotThatOne) {
+    for (const std::uint32_t silent : {0u, 1u, 2u}) {
+        Three three;
+        int turns = 0;
+        three.run([&](std::uint32_t from, std::uint32_t to, const WorkerMessage&, bool) {
+            return from != silent || to != (silent + 1) % 3 || ++turns < 20;
+        });
+        EXPECT_EQ(std::ranges::count(three.members, silent), 0) << three.record.notes;
+        EXPECT_EQ(three.members.size(), 2u) << three.record.notes;
+    }
+}
+
+TEST(Silence, WhatIsLostIsAskedForAndNobodyIsGivenUp) {
+    for (unsigned seed = 0; seed < 5; ++seed) {
+        std::mt19937 random(seed);
+        Three three;
+        three.run([&](std::uint32_t, std::uint32_t, const WorkerMessage&, bool direct) {
+            return !direct || random() % 10 > 0;
+        });
+        EXPECT_EQ(three.members.size(), 3u) << three.record.notes;
+    }
+}
+
+// Each answer is a message of the one that was asked.
+TEST(Silence, WhoAsksWithoutEndHasNobodyElseGivenUp) {
+    Three three;
+    int turns = 0;
+    three.more = [&](Coordinator& meeting, std::uint32_t number, SharedWorldWorker& worker) {
+        if (number != 0 || ++turns < 10 || !meeting.is_member(0)) return;
+        for (int i = 0; i < 20; ++i) {
+            const HeardMessage again{0, true};
+            meeting.take(0, worker.relayed({1, 2}, encode({0, 0, worker.steps_done()}, again)));
+            meeting.advance();
+        }
+    };
+    three.run([](std::uint32_t, std::uint32_t, const WorkerMessage&, bool) { return true; });
+    EXPECT_EQ(std::ranges::count(three.members, 1u) + std::ranges::count(three.members, 2u), 2)
+        << three.record.notes;
 }
 
 // Past the sockets: what a member's messages may cost the application and the others until it is lost.

@@ -63,7 +63,7 @@ public:
             report.smoothed_s = static_cast<float>(market.smoothed());
             report.own = static_cast<std::uint32_t>(own(w));
             for (std::uint32_t other = 0; own(w) > 0 && other < markets_.size(); ++other)
-                if (other != w) markets_[other].heard(w, step_, epoch_, report);
+                if (other != w) markets_[other].heard({w, epoch_, step_}, report.smoothed_s, report.own);
         }
         for (std::uint32_t w = 0; w < markets_.size(); ++w) {
             if (!markets_[w].wants_to_sell()) continue;

@@ -65,13 +65,14 @@ private:
         zmq::message_t frame;
         if (!socket.recv(frame)) return;
         const auto* bytes = frame.data<std::uint8_t>();
-        sim::DecodedMessage m = sim::decode_for_worker({bytes, frame.size()});
+        sim::DecodedMessage m = sim::decode_message({bytes, frame.size()});
         given_up_ = given_up_ || std::holds_alternative<sim::Refusal>(m.message);
         if (const auto* scene = std::get_if<sim::SceneMessage>(&m.message)) {
             number_ = scene->worker;
             worker_.emplace(*scene);
             if (habit_ != Habit::floods_links) return;
-            links_.emplace(context_, sim::PeerLinks::Settings{number_, endpoint_, {}, 1 << 20, 1000, 1000});
+            links_.emplace(context_, sim::PeerLinks::Settings{
+                                         number_, scene->settings.pace, endpoint_, {}, 1 << 20, 1000, 1000});
             if (links_->reach()) send(socket, sim::encode({number_, 0, 0}, *links_->reach()));
         } else if (const auto* peers = std::get_if<sim::PeersMessage>(&m.message)) {
             if (links_) links_->add(*peers);

@@ -25,8 +25,8 @@ constexpr sim::Secret kOfOne = {1}, kOfTwo = {2};
 /// Links of a worker. Two in one process have a context each, and the second one's socket another name.
 struct End {
     explicit End(std::uint32_t self, const std::string& application,
-                 const std::optional<sim::WorkerKeys>& keys = {})
-        : links(context, {self, application, keys, 1 << 20, kMostParts, kLastStep}) {}
+                 const std::optional<sim::WorkerKeys>& keys = {}, sim::Pace pace = sim::Pace::lockstep)
+        : links(context, {self, pace, application, keys, 1 << 20, kMostParts, kLastStep}) {}
     /// Takes what is there, for a while; parts are kept.
     void live(Clock::duration time) {
         for (const Clock::time_point start = Clock::now(); Clock::now() - start < time;

@@ -105,7 +105,7 @@ TEST(WorkerGate, AStrangersMessagesAreRefusedAndGarbageIsCountedAndAnsweredByNot
     sim::WorkerGate gate({"", {}, 60});
     Peer member(gate.private_endpoint()), stranger(gate.private_endpoint());
     join(gate, member, 0);
-    stranger.send(sim::Handover{1, 1, {}, {}, {}}, 0);
+    stranger.send(sim::Handover{1, 1, {}}, 0);
     EXPECT_TRUE(gets<sim::Refusal>(stranger));
     std::mt19937 rng(2);
     for (int i = 0; i < 300; ++i) {

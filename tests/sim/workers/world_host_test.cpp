@@ -425,28 +425,37 @@ TEST(SharedWorldRun, HostsTellEachOtherDirectlyAndByTheApplicationOnceTheirCable
     if (!OtherHost::possible()) GTEST_SKIP() << "network namespaces are not permitted here";
     const KeyFolder keys({"one", "two", "three"});
     const sim::WorldScene scene = heap(18);
-    const OtherHost one(1), two(2), three(3);
-    one.connect(two), one.connect(three);  // two and three never reach each other
-    sim::DistributedLaunch launch;
-    launch.listen = "tcp://0.0.0.0:*", launch.keys = keys.path(), launch.expect = 3;
-    std::vector<sim::WorkerProcess> workers;
-    workers.reserve(3);
-    launch.listening = [&](const std::string& endpoint) {
-        for (const auto& [host, key] :
-             {std::pair(&one, "one.key"), {&two, "two.key"}, {&three, "three.key"}}) {
-            sim::WorkerLaunch there = host->there(run_test("WorldProcess.DISABLED_Works", 1));
-            there.arguments.insert(there.arguments.end(), {"--key", (keys.path() / key).string()});
-            workers.emplace_back(there, "tcp://" + host->here() + port_of(endpoint));
+    for (const sim::Pace pace : {sim::Pace::lockstep, sim::Pace::bounded}) {
+        const OtherHost one(1), two(2), three(3);
+        one.connect(two), one.connect(three);  // two and three never reach each other
+        sim::DistributedLaunch launch;
+        launch.listen = "tcp://0.0.0.0:*", launch.keys = keys.path(), launch.expect = 3;
+        std::vector<sim::WorkerProcess> workers;
+        workers.reserve(3);
+        launch.listening = [&](const std::string& endpoint) {
+            for (const auto& [host, key] :
+                 {std::pair(&one, "one.key"), {&two, "two.key"}, {&three, "three.key"}}) {
+                sim::WorkerLaunch there = host->there(run_test("WorldProcess.DISABLED_Works", 1));
+                there.arguments.insert(there.arguments.end(), {"--key", (keys.path() / key).string()});
+                workers.emplace_back(there, "tcp://" + host->here() + port_of(endpoint));
+            }
+        };
+        Watcher watcher;
+        watcher.act_at = {400};
+        watcher.act = [&] { one.cut_from(two); };
+        sim::DistributedSettings settings = lockstep(800);
+        settings.pace = pace, settings.bound = pace == sim::Pace::bounded ? 4 : 0;
+        const sim::DistributedResult result = sim::run_distributed(scene, settings, launch, watcher);
+        if (pace == sim::Pace::lockstep) {
+            EXPECT_EQ(watcher.hash, hash_alone(scene, 800));
         }
-    };
-    Watcher watcher;
-    watcher.act_at = {400};
-    watcher.act = [&] { one.cut_from(two); };
-    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(800), launch, watcher);
-    EXPECT_EQ(watcher.hash, hash_alone(scene, 800));
-    EXPECT_EQ(result.lost, 0);
-    EXPECT_GT(result.bytes_linked, 0u);
-    for (sim::WorkerProcess& worker : workers) EXPECT_TRUE(comes_true([&] { return worker.has_ended(); }));
+        EXPECT_EQ(result.steps, 800u);
+        EXPECT_EQ(result.lost, 0);
+        EXPECT_EQ(result.refused_messages, 0u);
+        EXPECT_GT(result.bytes_linked, 0u);
+        for (sim::WorkerProcess& worker : workers)
+            EXPECT_TRUE(comes_true([&] { return worker.has_ended(); }));
+    }
 }
 
 // Bodies wander from the first worker to the others all the while, so that what happens falls into trades.
