@@ -109,7 +109,7 @@ protected:
     Report report_;
 };
 
-/// Another worker says what cannot be. It came from that one itself: the application has not seen it.
+/// Another worker says what cannot be. The application has not seen it, or cannot know that.
 struct PeerError : DecodeError {
     PeerError(std::uint32_t who, const std::string& what) : DecodeError(what), worker(who) {}
     std::uint32_t worker;
