@@ -1,214 +1,16 @@
+#include "shared/bounded_exchange.h"
+
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <set>
 #include <utility>
 
 #include "messages/update_codec.h"
-#include "shared/body_costs.h"
-#include "shared/neighbour_check.h"
-#include "shared/neighbour_streams.h"
-#include "shared/neighbour_telling.h"
-#include "shared/replica.h"
-#include "shared/replica_protocol.h"
-#include "shared/shared_contacts.h"
-#include "shared/structures.h"
 
 namespace sim {
 namespace {
 
-// Every worker is at a step of its own. Its world holds its bodies; of the others' bodies those that may come
-// near are put in as ghosts for each step, and move with them.
-//
-// After a step it tells every other worker which of its bodies may come near that one's, as far as it knows where these are, and
-// what it found at contacts with them; the application is told of all bodies. A body that is not named is far away. What sleeps is
-// told once to each, when it is near, and once more when it wakes.
-//
-// Bodies change owners at a step which all other owners have told the seller, see may_give: so it has compared with them what was found
-// up to there, and the buyer compares what comes after. Who does not know yet of a sale tells the seller what it finds at these bodies;
-// as soon as it knows it tells the buyer (FoundMessage). Until all have done so the buyer
-// compares nothing of them. What a worker says that knows of a sale counts once this one knows of it, and has heard the seller up to it.
-//
-// A contact between bodies of two owners is resolved by both (SharedContacts), and workers whose bodies touch keep closer to
-// each other (touching_lead).
-class BoundedExchange final : public ReplicaProtocol {
-public:
-    explicit BoundedExchange(const SceneMessage& scene);
-
-    using ReplicaProtocol::take;
-    void take(const MessageHeader& header, NeighbourMessage&& message) override;
-    void take(const MessageHeader& header, FoundMessage&& message) override;
-    void take(const MessageHeader& header, const HeardMessage& message) override;
-    void take(SnapshotMessage&& message) override;
-    void members(const Members& message, std::uint32_t epoch) override;
-    void own(const Ownership& ownership, std::uint32_t epoch) override;
-    // Who came to the last step by taking bodies over has to say so, and where it is who goes on to a step in which bodies come.
-    [[nodiscard]] bool owes() const override {
-        return published_ < step_ && (owned_.empty() ? owners_.contains(self_) : at_end());
-    }
-    [[nodiscard]] bool ready() const override;
-    void step(const StepChannel& channel) override;
-    void publish(std::uint32_t epoch, const StepReport& report) override;
-    void follow() override;
-    [[nodiscard]] Holdings holdings() override;
-    [[nodiscard]] bool may_give() const override;
-    [[nodiscard]] bool all_have_heard() override;
-    void ask_again() override;
-    [[nodiscard]] std::uint64_t steps_of(std::uint32_t worker) const override { return known(worker); }
-    [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
-    void weigh() override { costs_.add(world_, owned_); }
-    [[nodiscard]] std::uint64_t steps_done() const override { return step_; }
-    [[nodiscard]] bool at_end() const override { return step_ >= settings_.steps; }
-    [[nodiscard]] bool done() const override { return at_end() && settled_; }
-    [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
-    [[nodiscard]] bool has_nothing() const override { return owned_.empty() && later_.empty(); }
-    [[nodiscard]] int lead() const override;
-    [[nodiscard]] int ghost_age() const override { return ghost_age_; }
-    [[nodiscard]] const World& world() const override { return world_; }
-    void use_threads(int threads) override { world_.use_threads(threads); }
-
-private:
-    struct Felt {                   // what other bodies of this worker do to an own one
-        StepImpulse mean;           // of a step
-        int steps = 0;              // that it is of
-        std::uint64_t held = 0;     // step in which they last did anything
-        std::uint64_t touched = 0;  // step in which it last touched another worker's
-        bool watched = false;       // in the step
-    };
-    void come_to(std::uint64_t step);
-    void list();
-    void set_own(int body, bool own);
-    struct Later {
-        Ownership ownership;
-        std::uint32_t epoch;
-    };
-    void take_over(const Later& later);
-    void take_due();
-    void place_ghosts();
-    void keep_crossed();
-    void feel();
-    void publish_last(const StepReport& report) const;
-    void tell_neighbours(const StepReport& report);
-    void tell(std::uint32_t worker);
-    void tell(int body, Update& update);
-    void see(int body, const WorldBodyState& state, bool asleep);
-    void pack(std::size_t which);
-    template <typename Check>
-    static void checked(const MessageHeader& header, Check check) {
-        try {
-            check();
-        } catch (const DecodeError& wrong) {
-            throw PeerError(header.worker, wrong.what());
-        }
-    }
-    [[nodiscard]] bool is_told(int body) const;
-    void hear_all();
-    void hear(const MessageHeader& header, NeighbourMessage&& message);
-    void hear(const MessageHeader& header, FoundMessage&& message);
-    void take_around(const Ownership& ownership);
-    void bought(std::vector<int>&& bodies, std::uint32_t epoch);
-    void complete();
-    void compare(std::uint32_t worker, std::uint64_t step) {
-        if (step <= step_) contacts_.compare(worker, step, step_);
-    }
-    void see_own();
-    [[nodiscard]] std::vector<WorldRecord> coming() const;
-    void tell_in_order(std::uint32_t to, const WorkerMessage& message);
-    void send(std::uint32_t to, const WorkerMessage& message, bool by_application) const {
-        send_({to}, encode({self_, epoch_, step_}, message), by_application);
-    }
-    [[nodiscard]] std::uint64_t known(std::uint32_t worker) const {
-        const auto found = known_.find(worker);
-        return found == known_.end() ? 0 : found->second;
-    }
-    [[nodiscard]] std::uint64_t told(std::uint32_t worker) const {
-        const auto found = told_.find(worker);
-        return found == told_.end() ? 0 : found->second;
-    }
-    [[nodiscard]] std::uint32_t epoch_of(std::uint32_t worker) const {
-        const auto found = knows_.find(worker);
-        return found == knows_.end() ? 0 : found->second;
-    }
-    [[nodiscard]] std::uint64_t slowest() const;
-    [[nodiscard]] bool all_is_told(std::uint64_t step) const;
-    [[nodiscard]] bool begins_at(std::uint32_t worker, std::uint64_t step) const;
-    [[nodiscard]] bool is_waited_for() const;
-    [[nodiscard]] bool owns_any(std::uint32_t worker) const;
-
-    std::uint32_t self_, epoch_ = 0;
-    DistributedSettings settings_;
-    NeighbourCheck check_;
-    World world_;
-    SceneClock clock_;
-    BodyCosts costs_;
-    ColumnWatch columns_;
-    PlannedStructures planned_;
-    ForeignBodies foreign_;
-    std::uint64_t published_ = 0;  // step
-    std::uint64_t step_ = 0;
-    std::vector<std::uint32_t> owner_;  // as registered
-    std::set<std::uint32_t> owners_;    // who has any
-    std::vector<std::uint32_t> since_;  // bodies: epoch of that, or in which the application told of them
-    std::vector<std::uint8_t> own_, awaits_;  // awaits_: own, and what others found at it is not known
-    std::vector<int> owned_, others_;         // there, ascending; moving ones of others
-    std::vector<std::uint32_t> members_;
-    bool owners_follow_ = true;  // not all owners are known
-    SharedContacts contacts_;
-    std::map<std::uint32_t, std::uint64_t> known_;  // workers: step that they have done
-    std::map<std::uint32_t, std::uint64_t> told_;   // workers: step of their last message
-    std::map<std::uint32_t, std::uint32_t> knows_;  // workers: epoch of their last message
-    std::map<std::uint32_t, std::uint64_t>
-        begun_;          // workers that owned nothing before: step in which they got bodies
-    bool late_ = false;  // others were under way before this one came
-    NeighbourStreams streams_;
-    std::map<std::uint32_t, std::uint32_t>
-        asked_up_to_;  // workers: number of a message that they may not have heard
-    struct Sold {
-        std::uint32_t epoch, from;
-        std::uint64_t step;
-    };
-    std::vector<Sold> sold_;  // by others, that have not been heard up to there
-    std::vector<Later> later_;
-    std::vector<ForeignBall> balls_;
-    std::vector<int> near_;
-    std::vector<CrossImpulse> crossed_;              // in the last step
-    WorldRecord record_;                             // of the body that is being told of
-    std::vector<std::uint32_t> breakable_, broken_;  // constraints; those that broke in the last step
-    std::vector<int> first_of_constraint_;           // the first body of each that moves
-    std::map<int, Felt> felt_;                       // of own bodies that touch others'
-    std::vector<std::uint8_t> told_asleep_;          // the application was
-    // Kept for their storage:
-    WorkerMessage outgoing_ = UpdateMessage{}, to_neighbour_ = NeighbourMessage{};
-    Update update_;
-    NeighbourTelling telling_;
-    struct Packed {  // of each own body, as seen by telling_
-        int body;
-        std::int32_t update = -1, at = -1;  // in the message to the application, in packed_; -1: not there
-    };
-    std::vector<Packed> seen_;
-    PackedUpdates packed_;            // as neighbours need them
-    std::vector<std::uint8_t> flat_;  // bodies that are there: is_flat
-    /// Own bodies at which others have found what they have not yet told.
-    struct Purchase {
-        std::uint32_t epoch;
-        std::set<std::uint32_t> silent;  // workers
-        std::vector<int> bodies = {};
-        std::optional<std::uint64_t> step = {};  // up to which it is compared; none: they are not there yet
-        [[nodiscard]] bool is_complete() const { return step && silent.empty(); }
-    };
-    std::vector<Purchase> purchases_;
-    struct Touch {
-        std::uint64_t step = 0;  // in which their bodies and own ones last touched
-        int pairs = 0;           // of bodies, then
-    };
-    std::map<std::uint32_t, Touch> touched_;  // workers
-    int ghost_age_ = 0;
-    bool settled_ = false;
-};
-
 constexpr std::uint64_t kTouchingSteps = 4;
 
-constexpr std::uint64_t kForever = ~std::uint64_t{0};
 constexpr std::uint32_t kTellHeardAfter = 16;  // messages
 
 int keep_steps(int bound) {
@@ -234,6 +36,8 @@ void average(StepImpulse& mean, const StepImpulse* now, double weight) {
         pull(mean.linear, now->linear), pull(mean.angular, now->angular), pull(mean.modal, now->modal);
     }
 }
+
+}  // namespace
 
 BoundedExchange::BoundedExchange(const SceneMessage& scene)
     : self_(scene.worker),
@@ -386,194 +190,6 @@ void BoundedExchange::take(SnapshotMessage&& message) {
     come_to(message.snapshot.step);
 }
 
-void BoundedExchange::members(const Members& message, std::uint32_t epoch) {
-    epoch_ = epoch;
-    for (const std::uint32_t was : members_) {
-        if (std::ranges::find(message.workers, was) != message.workers.end()) continue;
-        known_[was] = kForever;
-        telling_.remove(was), streams_.remove(was);
-        std::erase_if(sold_, [was](const Sold& sold) { return sold.from == was; });
-        for (Purchase& purchase : purchases_) purchase.silent.erase(was);
-    }
-    members_ = message.workers;
-    complete();
-    hear_all();
-    for (const std::uint32_t worker : members_) {
-        if (worker == self_ || telling_.has(worker)) continue;
-        telling_.add(worker), streams_.add(worker);
-        if (step_ == 0 && !late_) continue;
-        see_own();  // it has to know how far this one is
-        auto& told = std::get<NeighbourMessage>(to_neighbour_);
-        told.own = static_cast<std::uint32_t>(owned_.size());
-        told.reach = telling_.reach(coming()), told.broken.clear(), told.places.clear();
-        for (const std::uint32_t c : breakable_)
-            if (!world_.constraint_holds(static_cast<int>(c))) told.broken.push_back(c);
-        tell(worker);
-    }
-    owners_follow_ = message.owners_follow;
-}
-
-// Others' bodies, unless more is known of them. They count until their owners have heard of the change.
-void BoundedExchange::take_around(const Ownership& ownership) {
-    for (std::size_t i = 0; i < ownership.around.size(); ++i) {
-        const WorldRecord& record = ownership.around[i];
-        const auto at = static_cast<std::size_t>(record.body);
-        if (own_[at] != 0 || owner_[at] == self_) continue;
-        since_[at] = epoch_;
-        if (!foreign_.known(record.body) || foreign_.newest(record.body) < ownership.around_step[i])
-            foreign_.set(record, ownership.around_step[i]);
-    }
-}
-
-void BoundedExchange::own(const Ownership& ownership, std::uint32_t epoch) {
-    epoch_ = epoch;
-    const std::uint32_t owner = ownership.owner, from = ownership.from;
-    const bool changes = from != kApplication && from != owner;  // else they are the first, or come back
-    // A worker that owned nothing begins here.
-    if (owner != self_ && !owners_.contains(owner)) {
-        begun_[owner] = ownership.step;
-        known_[owner] = std::max(known_[owner], ownership.step);
-    }
-    std::vector<int> bodies;
-    for (const WorldRecord& record : ownership.bodies) {
-        const auto at = static_cast<std::size_t>(record.body);
-        bodies.push_back(record.body);
-        since_[at] = epoch, owner_[at] = owner;
-        if (changes) contacts_.sold(record.body, from, ownership.step);
-        if (owner != self_ && own_[at] != 0) set_own(record.body, false);
-        // As last published: who was told has that, with the forces that held the bodies. What a lost worker told besides is void.
-        if (ownership.traded || foreign_.newest(record.body) != ownership.step)
-            foreign_.set(record, ownership.step);
-    }
-    owners_ = {owner_.begin(), owner_.end()};
-    std::ranges::sort(bodies);
-    // (Who got bodies at that step has found nothing before.)
-    if (changes && telling_.has(from) && told(from) < ownership.step && !begins_at(from, ownership.step))
-        sold_.push_back({epoch, from, ownership.step});
-    if (owner == self_) {
-        take_around(ownership);
-        if (changes) {
-            purchases_.push_back({epoch, {}});
-            telling_.each([this](std::uint32_t worker) { purchases_.back().silent.insert(worker); });
-        }
-        later_.push_back({ownership, epoch});
-        follow();
-        take_due();
-    } else if (telling_.has(owner)) {
-        see_own();
-        telling_.got(owner, ownership.bodies, epoch);
-        if (changes)
-            tell_in_order(owner, FoundMessage{streams_.next_number(owner), epoch, foreign_.found_at(bodies)});
-    }
-    list();
-    hear_all();
-}
-
-// Without bodies that are there: on to the first that come, but not past anybody.
-void BoundedExchange::follow() {
-    if (!owned_.empty() || later_.empty()) return;
-    std::uint64_t next = slowest();
-    for (const Later& later : later_) next = std::min(next, later.ownership.step);
-    if (next <= step_) return;
-    come_to(next);
-    step_ = next;
-    world_.set_step(step_);
-    take_due();
-}
-
-void BoundedExchange::take_due() {
-    for (std::size_t i = 0; i < later_.size();) {
-        if (later_[i].ownership.step > step_) {
-            ++i;
-            continue;
-        }
-        const Later due = std::move(later_[i]);
-        later_.erase(later_.begin() + static_cast<std::ptrdiff_t>(i));
-        take_over(due);
-    }
-}
-
-// The bodies as they are at this worker's step.
-void BoundedExchange::take_over(const Later& later) {
-    const Ownership& ownership = later.ownership;
-    settled_ = false;
-    std::vector<int> bodies;
-    for (const WorldRecord& record : ownership.bodies) {
-        const int body = record.body;
-        if (owner_[static_cast<std::size_t>(body)] != self_) continue;  // gone again
-        if (body < world_.bodies()) {
-            WorldRecord now = record;
-            if (step_ > ownership.step) {
-                const ForeignBodies::Ghost& ghost = foreign_.at(body, step_);
-                now.state = ghost.state;
-                now.asleep = now.asleep && ghost.asleep;
-            }
-            set_own(body, true);
-            world_.restore(now);
-            bodies.push_back(body);
-        } else {
-            set_own(body, true);
-            if (owned_.empty())
-                come_to(step_);  // its event may be due, and nothing else takes this worker on
-        }
-    }
-    list();
-    bought(std::move(bodies), later.epoch);
-}
-
-// They are own from here on, up to where the seller compared what others found. (Of a lost worker's bodies nobody knows what was compared.)
-void BoundedExchange::bought(std::vector<int>&& bodies, std::uint32_t epoch) {
-    const auto purchase = std::ranges::find(purchases_, epoch, &Purchase::epoch);
-    if (purchase == purchases_.end()) return;  // they come back
-    for (const int body : bodies) awaits_[static_cast<std::size_t>(body)] = 1;
-    purchase->bodies = std::move(bodies), purchase->step = step_;
-    complete();
-}
-
-// Purchases of which all others have told what they found.
-void BoundedExchange::complete() {
-    for (const Purchase& purchase : purchases_) {
-        if (!purchase.is_complete()) continue;
-        for (const int body : purchase.bodies) {
-            const auto at = static_cast<std::size_t>(body);
-            if (own_[at] == 0 || since_[at] != purchase.epoch) continue;
-            awaits_[at] = 0;
-            for (const auto& [worker, heard] : foreign_.all())
-                if (worker != self_)
-                    contacts_.took(body, worker, *purchase.step, std::min(told(worker), step_));
-        }
-    }
-    std::erase_if(purchases_, [](const Purchase& purchase) { return purchase.is_complete(); });
-}
-
-// Whether all is known here that others found up to a step.
-bool BoundedExchange::all_is_told(std::uint64_t step) const {
-    return std::ranges::all_of(members_, [&](std::uint32_t worker) {
-        return worker == self_ || !owns_any(worker) || told(worker) >= step || begins_at(worker, step);
-    });
-}
-
-bool BoundedExchange::begins_at(std::uint32_t worker, std::uint64_t step) const {
-    const auto begun = begun_.find(worker);
-    return begun != begun_.end() && begun->second >= step;
-}
-
-// What others have not told of own bodies for so long would be forgotten here before it is compared. And what another one has not heard
-// is kept.
-bool BoundedExchange::is_waited_for() const {
-    bool waits = std::ranges::any_of(purchases_, [this](const Purchase& p) {
-        return p.step && *p.step + static_cast<std::uint64_t>(blow_window(settings_.bound)) <= step_;
-    });
-    telling_.each([&](std::uint32_t worker) { waits = waits || streams_.is_full(worker); });
-    return waits;
-}
-
-// What others found up to this step at own bodies is known and compared.
-bool BoundedExchange::may_give() const {
-    return sold_.empty() && all_is_told(step_) &&
-           std::ranges::none_of(purchases_, [](const Purchase& p) { return p.step.has_value(); });
-}
-
 bool BoundedExchange::all_have_heard() {
     bool all = true;
     telling_.each([&](std::uint32_t worker) {
@@ -584,20 +200,6 @@ bool BoundedExchange::all_have_heard() {
         send(worker, HeardMessage{streams_.tell_heard(worker), true}, true);
     });
     return all;
-}
-
-bool BoundedExchange::owns_any(std::uint32_t worker) const {
-    return std::find(members_.begin(), members_.end(), worker) != members_.end() && owners_.contains(worker);
-}
-
-std::uint64_t BoundedExchange::slowest() const {
-    if (owners_follow_) return 0;  // whoever that may be
-    std::uint64_t slowest = kForever;
-    for (const std::uint32_t worker : members_) {
-        if (worker == self_ || !owns_any(worker)) continue;
-        slowest = std::min(slowest, known(worker));
-    }
-    return slowest;
 }
 
 int BoundedExchange::lead() const {
@@ -807,14 +409,6 @@ void BoundedExchange::tell_in_order(std::uint32_t to, const WorkerMessage& messa
     send_({to}, std::move(bytes), false);
 }
 
-// Bodies that are registered for this worker, and come in later steps.
-std::vector<WorldRecord> BoundedExchange::coming() const {
-    std::vector<WorldRecord> bodies;
-    for (const Later& later : later_)
-        bodies.insert(bodies.end(), later.ownership.bodies.begin(), later.ownership.bodies.end());
-    return bodies;
-}
-
 // Else it is far away by now.
 bool BoundedExchange::is_told(int body) const {
     const auto at = static_cast<std::size_t>(body);
@@ -842,20 +436,6 @@ Holdings BoundedExchange::holdings() {
     planned_.add_unfinished(world_.bodies(), whole);
     return columns_.holdings(self_, world_, owner_, costs_, place, whole);
 }
-
-Handover BoundedExchange::give(const std::vector<std::uint32_t>& bodies) {
-    Handover handover;
-    for (const std::uint32_t id : bodies) {
-        const int body = static_cast<int>(id);
-        handover.bodies.push_back(world_.record(body));
-        foreign_.set(handover.bodies.back(), step_);
-        set_own(body, false);
-    }
-    list();
-    return handover;
-}
-
-}  // namespace
 
 std::unique_ptr<ReplicaProtocol> make_bounded_exchange(const SceneMessage& scene) {
     return std::make_unique<BoundedExchange>(scene);

@@ -206,7 +206,7 @@ Ownership Coordinator::ownership(const Group& group) const {
 }
 
 void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,
-                                 const Handover* handed) {
+                                 bool traded) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = owner;
     for (const Group& group : groups(bodies)) {
         ++epoch_;
@@ -216,7 +216,7 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
         }
         Ownership message = ownership(group);
         message.from = from;
-        message.traded = handed && handed->to == owner;
+        message.traded = traded;
         if (settings_.pace == Pace::bounded && from != kApplication) {
             std::vector<std::uint32_t> others = members_;
             std::erase(others, owner);
@@ -324,7 +324,7 @@ std::map<std::uint32_t, std::vector<int>> Coordinator::shares(
     return plan;
 }
 
-void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed) {
+void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
     if (members_.empty()) {
         if (!bodies.empty()) orphans_.emplace_back(from, bodies);
@@ -332,7 +332,7 @@ void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from, 
     }
     const std::vector<std::uint32_t> others = staying();
     for (const auto& [worker, share] : shares(bodies, others.empty() ? members_ : others))
-        register_owner(share, worker, from, handed);
+        register_owner(share, worker, from);
 }
 
 // Of those who do not leave; or who leaves last, if all do.

@@ -123,16 +123,16 @@ private:
     void remove(std::uint32_t worker);
     [[nodiscard]] std::map<std::uint32_t, std::vector<int>> shares(
         const std::vector<int>& bodies, const std::vector<std::uint32_t>& workers) const;
-    void share_out(const std::vector<int>& bodies, std::uint32_t from, const Handover* handed = nullptr);
+    void share_out(const std::vector<int>& bodies, std::uint32_t from);
     [[nodiscard]] std::vector<int> owned_by(std::uint32_t worker) const;
     [[nodiscard]] std::vector<std::vector<int>> whole_lots() const;
     [[nodiscard]] std::vector<int> there_now() const;
     [[nodiscard]] std::vector<std::vector<int>> flat_structures_now() const;
     [[nodiscard]] std::vector<Eigen::Vector3d> places(const std::vector<std::vector<int>>& lots) const;
     [[nodiscard]] std::vector<Group> groups(const std::vector<int>& bodies) const;
-    /// sold: by this handover.
+    /// traded: a buyer has got them.
     void register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,
-                        const Handover* handed = nullptr);
+                        bool traded = false);
     [[nodiscard]] Ownership ownership(const Group& group) const;
     void add_what_is_around(Ownership& message) const;
     void catch_up(std::uint32_t worker);

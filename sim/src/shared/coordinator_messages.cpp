@@ -308,15 +308,15 @@ void Coordinator::take_handover(const MessageHeader& header, Handover&& message)
     if (traded) {
         if (!leaving_.contains(header.worker)) ++result_.trades;
         result_.migrations += bodies.size();
-        register_owner(bodies, message.to, header.worker, &message);
+        register_owner(bodies, message.to, header.worker, true);
     } else if (message.to == kApplication && members_.size() > 1) {
         // Of one who leaves: not back to it.
         const std::vector<std::uint32_t> all = members_;
         std::erase(members_, header.worker);
-        share_out(bodies, header.worker, &message);
+        share_out(bodies, header.worker);
         members_ = all;
     } else {
-        register_owner(bodies, header.worker, header.worker, &message);
+        register_owner(bodies, header.worker, header.worker);
     }
     advance();
 }

@@ -30,7 +30,7 @@ public:
     using Report = std::function<void(const MessageHeader&, double smoothed_s, std::uint32_t own)>;
     void report_to(Report report) { report_ = std::move(report); }
 
-    /// What another worker says of its steps, in the order in which it was sent, but where a way broke (bounded).
+    /// What another worker says of its steps, in the order in which it was sent (lockstep).
     virtual void take(const MessageHeader& header, StateMessage&& message) { (void)header, (void)message; }
     virtual void take(const MessageHeader& header, PublishedMessage&& message) {
         (void)header, (void)message;

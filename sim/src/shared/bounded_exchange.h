@@ -1,0 +1,207 @@
+#pragma once
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "shared/body_costs.h"
+#include "shared/neighbour_check.h"
+#include "shared/neighbour_streams.h"
+#include "shared/neighbour_telling.h"
+#include "shared/replica.h"
+#include "shared/replica_protocol.h"
+#include "shared/shared_contacts.h"
+#include "shared/structures.h"
+
+namespace sim {
+
+/// Every worker is at a step of its own. Its world holds its bodies; of the others' bodies those that may come
+/// near are put in as ghosts for each step, and move with them.
+///
+/// After a step it tells every other worker which of its bodies may come near that one's, as far as it knows where these are, and
+/// what it found at contacts with them; the application is told of all bodies. A body that is not named is far away. What sleeps is
+/// told once to each, when it is near, and once more when it wakes.
+///
+/// Bodies change owners at a step which all other owners have told the seller, see may_give: so it has compared with them what was found
+/// up to there, and the buyer compares what comes after. Who does not know yet of a sale tells the seller what it finds at these bodies;
+/// as soon as it knows it tells the buyer (FoundMessage). Until all have done so the buyer
+/// compares nothing of them. What a worker says that knows of a sale counts once this one knows of it, and has heard the seller up to it.
+///
+/// A contact between bodies of two owners is resolved by both (SharedContacts), and workers whose bodies touch keep closer to
+/// each other (touching_lead).
+class BoundedExchange final : public ReplicaProtocol {
+public:
+    explicit BoundedExchange(const SceneMessage& scene);
+
+    using ReplicaProtocol::take;
+    void take(const MessageHeader& header, NeighbourMessage&& message) override;
+    void take(const MessageHeader& header, FoundMessage&& message) override;
+    void take(const MessageHeader& header, const HeardMessage& message) override;
+    void take(SnapshotMessage&& message) override;
+    void members(const Members& message, std::uint32_t epoch) override;
+    void own(const Ownership& ownership, std::uint32_t epoch) override;
+    // Who came to the last step by taking bodies over has to say so, and where it is who goes on to a step in which bodies come.
+    [[nodiscard]] bool owes() const override {
+        return published_ < step_ && (owned_.empty() ? owners_.contains(self_) : at_end());
+    }
+    [[nodiscard]] bool ready() const override;
+    void step(const StepChannel& channel) override;
+    void publish(std::uint32_t epoch, const StepReport& report) override;
+    void follow() override;
+    [[nodiscard]] Holdings holdings() override;
+    [[nodiscard]] bool may_give() const override;
+    [[nodiscard]] bool all_have_heard() override;
+    void ask_again() override;
+    [[nodiscard]] std::uint64_t steps_of(std::uint32_t worker) const override { return known(worker); }
+    [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
+    void weigh() override { costs_.add(world_, owned_); }
+    [[nodiscard]] std::uint64_t steps_done() const override { return step_; }
+    [[nodiscard]] bool at_end() const override { return step_ >= settings_.steps; }
+    [[nodiscard]] bool done() const override { return at_end() && settled_; }
+    [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
+    [[nodiscard]] bool has_nothing() const override { return owned_.empty() && later_.empty(); }
+    [[nodiscard]] int lead() const override;
+    [[nodiscard]] int ghost_age() const override { return ghost_age_; }
+    [[nodiscard]] const World& world() const override { return world_; }
+    void use_threads(int threads) override { world_.use_threads(threads); }
+
+private:
+    struct Felt {                   // what other bodies of this worker do to an own one
+        StepImpulse mean;           // of a step
+        int steps = 0;              // that it is of
+        std::uint64_t held = 0;     // step in which they last did anything
+        std::uint64_t touched = 0;  // step in which it last touched another worker's
+        bool watched = false;       // in the step
+    };
+    void come_to(std::uint64_t step);
+    void list();
+    void set_own(int body, bool own);
+    struct Later {
+        Ownership ownership;
+        std::uint32_t epoch;
+    };
+    void take_over(const Later& later);
+    void take_due();
+    void place_ghosts();
+    void keep_crossed();
+    void feel();
+    void publish_last(const StepReport& report) const;
+    void tell_neighbours(const StepReport& report);
+    void tell(std::uint32_t worker);
+    void tell(int body, Update& update);
+    void see(int body, const WorldBodyState& state, bool asleep);
+    void pack(std::size_t which);
+    template <typename Check>
+    static void checked(const MessageHeader& header, Check check) {
+        try {
+            check();
+        } catch (const DecodeError& wrong) {
+            throw PeerError(header.worker, wrong.what());
+        }
+    }
+    [[nodiscard]] bool is_told(int body) const;
+    void hear_all();
+    void hear(const MessageHeader& header, NeighbourMessage&& message);
+    void hear(const MessageHeader& header, FoundMessage&& message);
+    void take_around(const Ownership& ownership);
+    void bought(std::vector<int>&& bodies, std::uint32_t epoch);
+    void complete();
+    void compare(std::uint32_t worker, std::uint64_t step) {
+        if (step <= step_) contacts_.compare(worker, step, step_);
+    }
+    void see_own();
+    [[nodiscard]] std::vector<WorldRecord> coming() const;
+    void tell_in_order(std::uint32_t to, const WorkerMessage& message);
+    void send(std::uint32_t to, const WorkerMessage& message, bool by_application) const {
+        send_({to}, encode({self_, epoch_, step_}, message), by_application);
+    }
+    [[nodiscard]] std::uint64_t known(std::uint32_t worker) const {
+        const auto found = known_.find(worker);
+        return found == known_.end() ? 0 : found->second;
+    }
+    [[nodiscard]] std::uint64_t told(std::uint32_t worker) const {
+        const auto found = told_.find(worker);
+        return found == told_.end() ? 0 : found->second;
+    }
+    [[nodiscard]] std::uint32_t epoch_of(std::uint32_t worker) const {
+        const auto found = knows_.find(worker);
+        return found == knows_.end() ? 0 : found->second;
+    }
+    [[nodiscard]] std::uint64_t slowest() const;
+    [[nodiscard]] bool all_is_told(std::uint64_t step) const;
+    [[nodiscard]] bool begins_at(std::uint32_t worker, std::uint64_t step) const;
+    [[nodiscard]] bool is_waited_for() const;
+    [[nodiscard]] bool owns_any(std::uint32_t worker) const;
+
+    std::uint32_t self_, epoch_ = 0;
+    DistributedSettings settings_;
+    NeighbourCheck check_;
+    World world_;
+    SceneClock clock_;
+    BodyCosts costs_;
+    ColumnWatch columns_;
+    PlannedStructures planned_;
+    ForeignBodies foreign_;
+    std::uint64_t published_ = 0;  // step
+    std::uint64_t step_ = 0;
+    std::vector<std::uint32_t> owner_;  // as registered
+    std::set<std::uint32_t> owners_;    // who has any
+    std::vector<std::uint32_t> since_;  // bodies: epoch of that, or in which the application told of them
+    std::vector<std::uint8_t> own_, awaits_;  // awaits_: own, and what others found at it is not known
+    std::vector<int> owned_, others_;         // there, ascending; moving ones of others
+    std::vector<std::uint32_t> members_;
+    bool owners_follow_ = true;  // not all owners are known
+    SharedContacts contacts_;
+    std::map<std::uint32_t, std::uint64_t> known_;  // workers: step that they have done
+    std::map<std::uint32_t, std::uint64_t> told_;   // workers: step of their last message
+    std::map<std::uint32_t, std::uint32_t> knows_;  // workers: epoch of their last message
+    std::map<std::uint32_t, std::uint64_t>
+        begun_;          // workers that owned nothing before: step in which they got bodies
+    bool late_ = false;  // others were under way before this one came
+    NeighbourStreams streams_;
+    std::map<std::uint32_t, std::uint32_t>
+        asked_up_to_;  // workers: number of a message that they may not have heard
+    struct Sold {
+        std::uint32_t epoch, from;
+        std::uint64_t step;
+    };
+    std::vector<Sold> sold_;  // by others, that have not been heard up to there
+    std::vector<Later> later_;
+    std::vector<ForeignBall> balls_;
+    std::vector<int> near_;
+    std::vector<CrossImpulse> crossed_;              // in the last step
+    WorldRecord record_;                             // of the body that is being told of
+    std::vector<std::uint32_t> breakable_, broken_;  // constraints; those that broke in the last step
+    std::vector<int> first_of_constraint_;           // the first body of each that moves
+    std::map<int, Felt> felt_;                       // of own bodies that touch others'
+    std::vector<std::uint8_t> told_asleep_;          // the application was
+    // Kept for their storage:
+    WorkerMessage outgoing_ = UpdateMessage{}, to_neighbour_ = NeighbourMessage{};
+    Update update_;
+    NeighbourTelling telling_;
+    struct Packed {  // of each own body, as seen by telling_
+        int body;
+        std::int32_t update = -1, at = -1;  // in the message to the application, in packed_; -1: not there
+    };
+    std::vector<Packed> seen_;
+    PackedUpdates packed_;            // as neighbours need them
+    std::vector<std::uint8_t> flat_;  // bodies that are there: is_flat
+    /// Own bodies at which others have found what they have not yet told.
+    struct Purchase {
+        std::uint32_t epoch;
+        std::set<std::uint32_t> silent;  // workers
+        std::vector<int> bodies = {};
+        std::optional<std::uint64_t> step = {};  // up to which it is compared; none: they are not there yet
+        [[nodiscard]] bool is_complete() const { return step && silent.empty(); }
+    };
+    std::vector<Purchase> purchases_;
+    struct Touch {
+        std::uint64_t step = 0;  // in which their bodies and own ones last touched
+        int pairs = 0;           // of bodies, then
+    };
+    std::map<std::uint32_t, Touch> touched_;  // workers
+    int ghost_age_ = 0;
+    bool settled_ = false;
+};
+
+}  // namespace sim
