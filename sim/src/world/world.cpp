@@ -232,27 +232,54 @@ int World::Implementation::still_steps_to_sleep() const {
     return static_cast<int>(std::ceil(kStillTime / settings.dt - 1e-9));
 }
 
+// Whether something that does not move holds an island up.
+bool World::Implementation::is_held(const Island& island) const {
+    const auto holds = [this](int id) {
+        return id < 0 || !bodies[static_cast<std::size_t>(id)].moves() ||
+               bodies[static_cast<std::size_t>(id)].asleep;
+    };
+    return std::ranges::any_of(island.manifolds,
+                               [&](int m) {
+                                   const auto& [a, b] = touching[static_cast<std::size_t>(m)];
+                                   return holds(a) || holds(b);
+                               }) ||
+           std::ranges::any_of(island.constraints, [&](int c) {
+               const PointConstraint& held = constraints[static_cast<std::size_t>(c)].definition;
+               return holds(held.body_a) || holds(held.body_b);
+           });
+}
+
+// Whether an island that nothing holds goes on, or would fall.
+bool World::Implementation::drifts(const Island& island) const {
+    constexpr double kAtRest = 1e-3;  // of the sleep speed
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+    double mass = 0;
+    for (const int id : island.bodies) {
+        const MovingBody& body = bodies[static_cast<std::size_t>(id)];
+        momentum += body.kind->mass.mass * body.state.velocity, mass += body.kind->mass.mass;
+        if (body.gravity_scale * settings.gravity.norm() != 0) return true;
+    }
+    return momentum.norm() > kAtRest * settings.sleep_speed * mass;
+}
+
 void World::Implementation::put_to_sleep() {
     const int wanted = std::min(still_steps_to_sleep(), kMostStillSteps);
     for (std::size_t i = 0; i < islands_used; ++i) {
         const Island& island = islands[i];
         if (!is_own(island)) continue;
         bool still = settings.sleeping && !outcomes[static_cast<std::size_t>(island.bodies.front())].carried;
+        const bool flies = island.manifolds.empty() && island.constraints.empty();
         for (const int id : island.bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
-            const bool slow =
-                body.state.velocity.norm() < settings.sleep_speed && point_speed(body) < settings.sleep_speed;
+            // What flies has not begun to come to rest.
+            const double speed = flies ? 1e-9 : settings.sleep_speed;
+            const bool slow = body.state.velocity.norm() < speed && point_speed(body) < speed;
             body.still_steps = slow ? std::min(body.still_steps + 1, kMostStillSteps) : 0;
             still = still && body.still_steps >= wanted;
             // What bodies of another world touch can rest only with them.
             if (sharing == Sharing::pairs) still = still && body.own && !body.pushed;
         }
-        if (!still) continue;
-        // What nothing holds is at rest only if nothing pulls.
-        const MovingBody& first = bodies[static_cast<std::size_t>(island.bodies.front())];
-        if (island.manifolds.empty() && island.constraints.empty() &&
-            (first.gravity_scale * settings.gravity.norm() != 0 || point_speed(first) > 1e-9))
-            continue;
+        if (!still || (!is_held(island) && drifts(island))) continue;
         for (const int id : island.bodies) {
             MovingBody& body = bodies[static_cast<std::size_t>(id)];
             if (body.own) outside -= body.kind->mass.mass * body.state.velocity;

@@ -162,6 +162,8 @@ struct World::Implementation {
     std::vector<WorldContacts::Meeting> last;  ///< what meets after all rounds
     void sum_outcomes();                       ///< of all islands
     [[nodiscard]] ContactScene contact_scene(Crew& crew);
+    [[nodiscard]] bool is_held(const Island& island) const;
+    [[nodiscard]] bool drifts(const Island& island) const;
     void put_to_sleep();                              ///< islands that are still
     void count_work();                                ///< see World::work
     void step();                                      ///< see World::step

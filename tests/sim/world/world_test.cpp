@@ -139,6 +139,31 @@ TEST(World, NothingFallsAsleepInMidAir) {
     EXPECT_NEAR(drift.state(0).position.x(), 0.01, 1e-12);
 }
 
+// What flies has not begun to come to rest, and what nothing holds does not stop by itself.
+TEST(World, SlowBodiesThatNothingHoldsReboundAndDriftOn) {
+    for (const double speed :
+         {0.01, 0.015, 0.019}) {  // (slower ones are within reach of each other for half a second)
+        sim::WorldDefinition meeting = weightless();
+        for (const double side : {-1, 1}) {
+            meeting.bodies.push_back(ball({side * (0.5 + speed), 3, 0}));  // they fly for a second
+            meeting.bodies.back().velocity = {-side * speed, 0, 0};
+            meeting.bodies.back().restitution = 1;
+        }
+        sim::World rebounding(meeting);
+        run(rebounding, 240);
+        for (const int i : {0, 1})
+            EXPECT_NEAR(rebounding.state(i).velocity.x(), i == 0 ? -speed : speed, 0.01 * speed) << speed;
+        sim::WorldDefinition together = meeting;
+        for (const int i : {0, 1}) {
+            together.bodies[i].world_from_body.translation().x() = i == 0 ? -0.5 : 0.5;
+            together.bodies[i].velocity = {0, 0, speed};
+        }
+        sim::World drift(together);
+        run(drift, 240);
+        for (const int i : {0, 1}) EXPECT_NEAR(drift.state(i).velocity.z(), speed, 1e-6 * speed) << speed;
+    }
+}
+
 TEST(World, DeformationDrivenToInversionIsHeldAtTheLimitWithoutGainOfEnergy) {
     for (const Fidelity fidelity : {Fidelity::linear, Fidelity::modal}) {
         sim::WorldDefinition definition = weightless();
