@@ -123,6 +123,18 @@ public:
         add(async_name + "over_lockstep", lockstep / balanced, "times as fast");
         add(async_name + "over_barrier", barrier / balanced, "times as fast");
         add(lockstep_name + "over_lockstep", lockstep / balanced_lockstep, "times as fast");
+        std::vector<double> gains{barrier / balanced};
+        for (int slow = 1; slow < workers; ++slow) {  // what they have at first differs
+            progress_(fmt::format("stragglers: permanent, worker {}", slow));
+            const Factor half = [slow](int worker, std::uint64_t) { return worker == slow ? 2.0 : 1.0; };
+            gains.push_back(measure(scene, workers, {options_.bound, false, half}).critical_path_s() /
+                            measure(scene, workers, {options_.bound, true, half}).result.elapsed_s);
+        }
+        std::ranges::sort(gains);
+        const std::string each_name = "straggler_permanent_each_async_balanced_over_barrier_";
+        add(each_name + "median", quantile(gains, 0.5), "times as fast");
+        add(each_name + "least", gains.front(), "times as fast");
+        add(each_name + "most", gains.back(), "times as fast");
         compare("straggler_unsteady_b4", sim_bench::unsteady, 4);
         compare("straggler_wandering_b16", wandering, 16);
         note(

@@ -80,6 +80,7 @@ TEST(BenchWorkers, TwentyFiveBallsOnTwoProcessorsGiveEveryFigureOfEveryPart) {
     for (const char* name :
          {"bodies25_workers2_async_speed_up", "bodies25_workers2_bytes_per_body_step",
           "straggler_permanent_async_balanced_over_lockstep", "straggler_unsteady_b4_async_over_lockstep",
+          "straggler_permanent_each_async_balanced_over_barrier_least",
           "straggler_wandering_b16_async_over_barrier", "bound16_height_at_end", "migration_bodies_traded"})
         EXPECT_GT(figures[name], 0) << name;
     EXPECT_EQ(figures.at("bound0_apart_after_a_second"), 0);

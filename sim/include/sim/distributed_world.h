@@ -180,10 +180,10 @@ struct SimulatedProcessors {
     double by_application_s = 0,
            directly_s =
                0;  ///< so much longer: what the application sends, or passes on; what workers tell directly
-    double slowdown = 1;  ///< simulated seconds per second of this thread's processor time
+    double slowdown = 1;  ///< simulated seconds per second of what steps cost, measured or modelled
     bool modelled =
         false;  ///< costs are counted (World::work), not measured: results are a pure function of the input
-    double seconds_per_work = 2e-6;  ///< modelled: of one unit of work
+    double seconds_per_work = 2e-6;  ///< modelled: of one unit of work, times slowdown
     /// In turns in one thread workers find their caches cold, which a processor of its own does not. So afterwards
     /// each worker does all that it did once more, without the others, and DistributedResult::cold_caches tells
     /// how much faster that is. That is measured, also if costs are modelled. Every message is kept for it.

@@ -399,7 +399,7 @@ void Machine::go_on(std::size_t number) {
 void Machine::after_part(Processor& p) {
     if (p.step->waits()) return;
     if (how_.modelled) {
-        p.step_cost = how_.seconds_per_work * p.worker->work() * p.slow;
+        p.step_cost = how_.seconds_per_work * how_.slowdown * p.worker->work() * p.slow;
         p.free_at += p.step_cost;
     }
     p.stepping = true;
