@@ -149,6 +149,8 @@ void write_body(ByteWriter& out, const Ownership& m) {
 }
 void write_body(ByteWriter& out, const SnapshotMessage& m) {
     write(out, m.snapshot);
+    out.count(m.sales.size());
+    for (const auto& [body, before, step] : m.sales) out.number(body), out.number(before), out.number(step);
 }
 void write_body(ByteWriter& out, const StateMessage& m) {
     write(out, m.report);
@@ -303,6 +305,11 @@ void read_body(ByteReader& in, Ownership& m) {
 }
 void read_body(ByteReader& in, SnapshotMessage& m) {
     m.snapshot = read_snapshot(in);
+    m.sales.resize(in.count(16));
+    for (auto& [body, before, step] : m.sales) {
+        body = in.number<std::uint32_t>(), before = in.number<std::uint32_t>();
+        step = in.number<std::uint64_t>();
+    }
 }
 void read_body(ByteReader& in, StateMessage& m) {
     m.report = read_report(in);

@@ -95,7 +95,7 @@ namespace sim {
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kProtocol = 14;  ///< version, of messages and of how worlds step
+constexpr std::uint16_t kProtocol = 15;  ///< version, of messages and of how worlds step
 
 struct MessageHeader {
     std::uint32_t worker = kApplication;
@@ -174,9 +174,16 @@ struct Ownership {
     std::vector<WorldRecord> around = {};
     std::vector<std::uint64_t> around_step = {};  ///< of each
 };
+/// A body had another owner up to the end of a step.
+struct PastSale {
+    std::uint32_t body, before;
+    std::uint64_t step;
+};
 /// Everything at the end of a step that all have done, for a worker that joins late, or a run that goes on from there.
 struct SnapshotMessage {
     WorldSnapshot snapshot;
+    std::vector<PastSale> sales =
+        {};  ///< bounded: of the steps that are still compared; of each body ascending
 };
 
 // Worker to the application after each step.

@@ -13,10 +13,6 @@ constexpr std::uint64_t kTouchingSteps = 4;
 
 constexpr std::uint32_t kTellHeardAfter = 16;  // messages
 
-int keep_steps(int bound) {
-    return 2 * blow_window(bound);
-}
-
 // Steps that workers whose bodies touch may be apart: bodies hold each other up by what was, and the older that is, the less
 // steady they stand. Where few touch it matters less than waiting does.
 std::uint64_t touching_lead(int bound, int pairs) {
@@ -49,9 +45,8 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
       columns_(scene.scene),
       planned_(scene.scene, columns_.side(),
                structure_outlook(scene.settings.bound, scene.scene.world.settings.dt)),
-      foreign_(world_, self_, clock_.bodies(), keep_steps(scene.settings.bound)),
-      contacts_(world_, foreign_, self_, {own_, awaits_, owner_}, keep_steps(scene.settings.bound),
-                blow_window(scene.settings.bound)),
+      foreign_(world_, self_, clock_.bodies(), kept_steps(scene.settings.bound)),
+      contacts_(world_, foreign_, self_, {own_, awaits_, owner_}, kept_steps(scene.settings.bound)),
       streams_(static_cast<std::size_t>(clock_.bodies()), scene.settings.bound),
       telling_(static_cast<std::size_t>(clock_.bodies()), scene.settings.bound, scene.scene.world.settings,
                columns_.side()) {
@@ -157,6 +152,7 @@ void BoundedExchange::hear(const MessageHeader& header, NeighbourMessage&& messa
     knows_[worker] = header.epoch;
     std::uint64_t &known = known_[worker], &told = told_[worker];
     if (header.step <= told) return;  // once more, as when this one had just joined
+    if (late_ && told == 0) foreign_.nothing_until(worker, header.step - 1);
     told = header.step, known = std::max(known, told);
     if (report_) report_(header, message.smoothed_s, message.own);
     const auto is_its = [&](int body) { return contacts_.owner(body, header.step) == worker; };
@@ -186,6 +182,7 @@ void BoundedExchange::hear(const MessageHeader& header, FoundMessage&& message) 
 // Bodies follow with their owners.
 void BoundedExchange::take(SnapshotMessage&& message) {
     late_ = true;
+    for (const PastSale& sale : message.sales) contacts_.sold(sale);
     world_.restore_contacts({}, message.snapshot.springs);
     come_to(message.snapshot.step);
 }
@@ -400,6 +397,7 @@ void BoundedExchange::tell(std::uint32_t worker) {
     std::ranges::copy_if(crossed_, std::back_inserter(message.crossed), [&](const CrossImpulse& c) {
         return owner_[static_cast<std::size_t>(c.ghost)] == worker;
     });
+    foreign_.telling(worker, step_, message.number);
     tell_in_order(worker, to_neighbour_);
 }
 

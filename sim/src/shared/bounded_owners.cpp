@@ -65,7 +65,7 @@ void BoundedExchange::own(const Ownership& ownership, std::uint32_t epoch) {
         const auto at = static_cast<std::size_t>(record.body);
         bodies.push_back(record.body);
         since_[at] = epoch, owner_[at] = owner;
-        if (changes) contacts_.sold(record.body, from, ownership.step);
+        if (changes) contacts_.sold({static_cast<std::uint32_t>(record.body), from, ownership.step});
         if (owner != self_ && own_[at] != 0) set_own(record.body, false);
         // As last published: who was told has that, with the forces that held the bodies. What a lost worker told besides is void.
         if (ownership.traded || foreign_.newest(record.body) != ownership.step)
@@ -188,7 +188,7 @@ bool BoundedExchange::begins_at(std::uint32_t worker, std::uint64_t step) const 
 // is kept.
 bool BoundedExchange::is_waited_for() const {
     bool waits = std::ranges::any_of(purchases_, [this](const Purchase& p) {
-        return p.step && *p.step + static_cast<std::uint64_t>(blow_window(settings_.bound)) <= step_;
+        return p.step && *p.step + static_cast<std::uint64_t>(comparison_steps(settings_.bound)) <= step_;
     });
     telling_.each([&](std::uint32_t worker) { waits = waits || streams_.is_full(worker); });
     return waits;

@@ -132,7 +132,7 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
 // A snapshot at the view's step and everything published of later ones. In lockstep a record that came with
 // ownership must not be known before the contacts that were published with it.
 void Coordinator::catch_up(std::uint32_t worker) {
-    send({worker}, SnapshotMessage{view_.snapshot()});
+    send({worker}, SnapshotMessage{view_.snapshot(), {sales_.begin(), sales_.end()}});
     for (const auto& [step, bytes] : kept_) queue_.push_back({{worker}, bytes});
     std::vector<int> all;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i)
@@ -218,6 +218,12 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
         message.from = from;
         message.traded = traded;
         if (settings_.pace == Pace::bounded && from != kApplication) {
+            while (!sales_.empty() &&
+                   sales_.front().step + static_cast<std::uint64_t>(kept_steps(settings_.bound)) <
+                       view_.step())
+                sales_.pop_front();
+            for (const int body : group.bodies)
+                if (from != owner) sales_.push_back({static_cast<std::uint32_t>(body), from, group.step});
             std::vector<std::uint32_t> others = members_;
             std::erase(others, owner);
             send(std::move(others), message);

@@ -166,6 +166,7 @@ private:
     bool started_ = false, finished_ = false, goes_on_ = false;
     std::vector<Outgoing> queue_;
     std::optional<NeighbourCheck> check_;
+    std::deque<PastSale> sales_;  // bounded: see SnapshotMessage
     /// Bounded: who asked whom for what it has not heard of it, and has no answer; whether that was so for long, see note_waiting.
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> asked_;
     /// Lockstep: state messages for workers that join later, of steps that the view has not reached.

@@ -34,7 +34,10 @@ ForeignBodies::Heard* ForeignBodies::slot(std::uint32_t worker, std::uint64_t st
     slots.resize(keep_);
     Heard& slot = slots[step % keep_];
     if (slot.step > step) return nullptr;
-    if (std::exchange(slot.step, step) != step) slot.there = false, slot.bodies.clear(), slot.crossed.clear();
+    if (std::exchange(slot.step, step) != step) {
+        slot.there = false, slot.heard = slot.own_number = 0;
+        slot.bodies.clear(), slot.crossed.clear();
+    }
     return &slot;
 }
 
@@ -47,6 +50,15 @@ const ForeignBodies::Heard* ForeignBodies::heard(std::uint32_t worker, std::uint
 
 void ForeignBodies::keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed) {
     if (Heard* own = slot(self_, step)) own->crossed = crossed, own->there = true;
+}
+
+void ForeignBodies::telling(std::uint32_t worker, std::uint64_t step, std::uint32_t number) {
+    if (Heard* heard = slot(worker, step)) heard->own_number = number;
+}
+
+void ForeignBodies::nothing_until(std::uint32_t worker, std::uint64_t step) {
+    for (std::uint64_t t = step > keep_ ? step - keep_ : 0; ++t <= step;)
+        if (Heard* heard = slot(worker, t)) heard->there = true;
 }
 
 void ForeignBodies::add(std::uint32_t worker, const FoundStep& found) {
@@ -78,7 +90,7 @@ void ForeignBodies::take(std::uint32_t worker, std::uint64_t step, NeighbourMess
     Heard* heard = slot(worker, step);
     if (!heard) return;
     add(worker, {step, std::move(message.crossed)});
-    heard->there = true;
+    heard->there = true, heard->heard = message.heard;
     const std::vector<PackedUpdates::Place>& bodies = message.bodies.places();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         const PackedUpdates::Place& place = bodies[i];
@@ -110,10 +122,12 @@ void ForeignBodies::born(const WorldRecord& record, std::uint64_t step) {
 void ForeignBodies::set(const WorldRecord& record, std::uint64_t step) {
     Told& told = rest_[record.body];
     told.step = step;
-    told.update = {};
-    told.update.body = static_cast<std::uint32_t>(record.body);
-    told.update.asleep = record.asleep, told.update.quarantined = record.quarantined;
-    told.update.state = record.state;
+    Update& update = told.update;
+    update.body = static_cast<std::uint32_t>(record.body);
+    update.asleep = record.asleep, update.quarantined = record.quarantined;
+    update.still = update.held = false;
+    update.state = record.state;
+    update.impulse.set_zero();
     tell(record.body, step, kApplication,
          {record.state.position, record.state.velocity, record.asleep, record.quarantined}, 0);
 }
@@ -147,7 +161,7 @@ ForeignBodies::Message ForeignBodies::last_until(int body, std::uint32_t worker,
             if (place == places.end() || place->body != static_cast<std::uint32_t>(body)) break;
             index = static_cast<std::size_t>(place - places.begin());
         }
-        best = {&slot, index};
+        best = {&slot, index, worker};
         if (step <= now || step == 0) break;
     }
     return best;
@@ -173,7 +187,7 @@ void ForeignBodies::find_told(int body, std::uint64_t now) {
     if (!best.heard || (registered && counts(rest->second, best.heard->step, now))) {
         told_ = rest_.at(body);  // who is known was registered at first
     } else {
-        told_.step = best.heard->step;
+        told_.step = best.heard->step, told_.heard = best.heard->heard, told_.worker = best.worker;
         best.heard->bodies.read(best.heard->bodies.places()[best.index], told_.update);
     }
 }
@@ -182,6 +196,40 @@ const ForeignBodies::Ghost& ForeignBodies::at(int body, std::uint64_t now) {
     find_told(body, now);
     extrapolate(body, now);
     return ghost_;
+}
+
+// What blows of steps before the told state gave the body, and its owner did not know by then: where the own one's number is lower
+// what was found here counts, instead of what was found there (SharedContacts).
+void ForeignBodies::add_owed(int body) {
+    const auto slots = heard_.find(told_.worker);
+    if (slots == heard_.end()) return;
+    const auto blow = [](const CrossImpulse& c) { return c.blow; };
+    for (std::uint64_t step = told_.step, left = keep_; step > 0 && left > 0; --step, --left) {
+        const Heard& theirs = slots->second[step % keep_];
+        if (theirs.step != step || theirs.own_number <= told_.heard) return;  // it knew
+        const Heard* own = heard(self_, step);
+        if (!own || (std::ranges::none_of(own->crossed, blow) && std::ranges::none_of(theirs.crossed, blow)))
+            continue;
+        StepImpulse owed;
+        const auto find = [](const std::vector<CrossImpulse>& crossed, int one, int other) {
+            const auto at = std::ranges::find_if(
+                crossed, [&](const CrossImpulse& c) { return c.own == one && c.ghost == other; });
+            return at == crossed.end() ? nullptr : &*at;
+        };
+        const auto owes = [&](const CrossImpulse* here, const CrossImpulse* there) {
+            if (!(here && here->blow) && !(there && there->blow)) return;
+            if (here) owed.linear -= here->linear, owed.angular += here->angular_ghost;
+            if (there) owed.linear -= there->linear, owed.angular -= there->angular_own;
+        };
+        for (const CrossImpulse& c : own->crossed)
+            if (c.ghost == body && c.own < body) owes(&c, find(theirs.crossed, body, c.own));
+        for (const CrossImpulse& c : theirs.crossed)
+            if (c.own == body && c.ghost < body && !find(own->crossed, c.ghost, body)) owes(nullptr, &c);
+        WorldBodyState& state = ghost_.state;
+        const Eigen::Vector3d velocity = owed.linear / world_->rigid_mass(body).mass;
+        state.velocity += velocity, state.angular_momentum += owed.angular;
+        state.position += dt_ * static_cast<double>(told_.step - step) * velocity;
+    }
 }
 
 void ForeignBodies::extrapolate(int body, std::uint64_t now) {
@@ -193,6 +241,7 @@ void ForeignBodies::extrapolate(int body, std::uint64_t now) {
     ghost.asleep = told.asleep;
     if (ghost.asleep || told.quarantined) return;
     ghost.age = now > told_.step ? static_cast<int>(now - told_.step) : 0;
+    add_owed(body);
     StepImpulse& held = ghost.held;
     for (std::uint64_t step = told_.step + 1; step <= now; ++step) {
         // What others hold goes on as it was told: the forces on it balance better than anybody knows them here.

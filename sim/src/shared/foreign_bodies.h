@@ -21,7 +21,9 @@ public:
     /// What a worker said of a step. Own messages hold only `crossed`.
     struct Heard {
         std::uint64_t step = 0;
-        bool there = false;  ///< its message has come
+        bool there = false;       ///< its message has come, or none will
+        std::uint32_t heard = 0;  ///< number of the last message of this worker that it had heard by then
+        std::uint32_t own_number = 0;  ///< of this worker's message to it of the step; 0: none
         PackedUpdates bodies;
         std::vector<CrossImpulse> crossed;
     };
@@ -29,6 +31,10 @@ public:
     void take(std::uint32_t worker, std::uint64_t step, NeighbourMessage&& message,
               const std::vector<std::uint32_t>& owner);
     void keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed);
+    /// A worker is told of own bodies in a step, by the message of this number.
+    void telling(std::uint32_t worker, std::uint64_t step, std::uint32_t number);
+    /// Of a worker's steps up to this one nothing more will come but what add() takes.
+    void nothing_until(std::uint32_t worker, std::uint64_t step);
     /// What a worker found in a step, beside what it has told of that.
     void add(std::uint32_t worker, const FoundStep& found);
     /// What this worker found at these bodies (ascending), its own and others, in the steps that it keeps.
@@ -71,6 +77,7 @@ private:
     struct Told {
         std::uint64_t step = 0;
         Update update;
+        std::uint32_t worker = kApplication, heard = 0;  ///< who told it, see Heard
     };
     struct Glance {
         Eigen::Vector3d position = Eigen::Vector3d::Zero(), velocity = position;  // [m], [m/s]
@@ -89,6 +96,7 @@ private:
     struct Message {
         const Heard* heard = nullptr;
         std::size_t index = 0;  // of the body
+        std::uint32_t worker = kApplication;
     };
     Heard* slot(std::uint32_t worker, std::uint64_t step);
     void tell(int body, std::uint64_t step, std::uint32_t worker, const Glance& glance, std::size_t index);
@@ -96,6 +104,7 @@ private:
                                      std::size_t index) const;
     [[nodiscard]] static bool counts(const Told& rest, std::uint64_t step, std::uint64_t now);
     void find_told(int body, std::uint64_t now);
+    void add_owed(int body);
     void extrapolate(int body, std::uint64_t now);
 
     World* world_;

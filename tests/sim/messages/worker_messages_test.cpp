@@ -143,7 +143,7 @@ std::vector<sim::WorkerMessage> world_samples() {
             sim::EndOfRun{},
             sim::Members{{0, 1, 5}, true},
             sim::Ownership{1, 0, true, 77, records, records, steps_of(records)},
-            sim::SnapshotMessage{{99, records, contacts, springs}},
+            sim::SnapshotMessage{{99, records, contacts, springs}, {{7, 2, 91}, {3, 0, 97}}},
             sim::StateMessage{report(), records, contacts, springs},
             sim::UpdateMessage{
                 report(), {update(rng, 12, true), update(rng, 12, false), update(rng, 0, true)}, {7}},

@@ -294,6 +294,28 @@ TEST(BoundedExchange, ReboundsAcrossWorkersKeepTheirEnergyAtAnyPace) {
     EXPECT_EQ(runs, 48);
 }
 
+// One owner finds the blow in the step before the other does: they meet where one step ends and another begins.
+TEST(BoundedExchange, BallsThatMeetBetweenStepsReboundOnce) {
+    for (const double e : {0.3, 0.8, 1.0})
+        for (const int bound : {1, 4, 16})
+            for (int start = -2; start <= 2; ++start) {
+                WorldDefinition d = world_test::weightless();
+                const double speed = 1, gap = 2 * speed * 0.4 + 1e-9 * start;  // 24 steps
+                for (const double side : {-1, 1}) {
+                    d.bodies.push_back(world_test::ball({side * (0.5 + gap / 2), 0, 0}));
+                    d.bodies.back().velocity = {-side * speed, 0, 0};
+                    d.bodies.back().restitution = e;
+                }
+                for (unsigned seed = 1; seed < 6; ++seed) {
+                    Crew crew(d, 2, bound, 60, {static_cast<int>(seed % 2), 1 - static_cast<int>(seed % 2)});
+                    crew.run_at_random(seed);
+                    for (int b = 0; b < 2; ++b)  // ghosts' speeds are rounded to 2^-11
+                        EXPECT_NEAR(crew.state(b).velocity.x(), b == 0 ? -e : e, 0.005)
+                            << "e " << e << ", bound " << bound << ", start " << start << ", seed " << seed;
+                }
+            }
+}
+
 TEST(BoundedExchange, StacksAcrossWorkersStandAsHighAsInOneProcess) {
     for (const int boxes : {2, 3})
         for (const int bound : {0, 1, 4}) {

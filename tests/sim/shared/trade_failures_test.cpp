@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <random>
+#include <string>
 
 #include "falling_bodies.h"
 #include "shared/coordinator.h"
@@ -213,15 +215,26 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
         }
 }
 
+struct MomentumRecord : Record {
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+    void at(std::uint64_t step, const sim::World& now) override {
+        Record::at(step, now);
+        momentum = now.momentum();
+    }
+};
+
+double weight_of(const sim::World& world) {  // [N]
+    double weight = 0;
+    for (int i = 0; i < world.bodies(); ++i)
+        if (world.definition(i).moves()) weight += 9.81 * world.rigid_mass(i).mass;
+    return weight;
+}
+
 // Bodies of a worker that leaves change owners at a step that neither side has passed, like those that are sold.
 TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
     sim::WorldScene scene;
     scene.world = sim_bench::falling_balls(60);
-    double weight = 0;  // [N]
-    const sim::World world(scene.world);
-    for (int i = 0; i < world.bodies(); ++i)
-        if (scene.world.bodies[static_cast<std::size_t>(i)].moves())
-            weight += 9.81 * world.rigid_mass(i).mass;
+    const double weight = weight_of(sim::World(scene.world));
     sim::DistributedSettings settings = lockstep(120);
     settings.pace = sim::Pace::bounded;
     for (const int bound : {0, 1, 4, 16})
@@ -237,13 +250,7 @@ TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
                 how.failures.push_back(
                     {whole * (0.2 + 0.17 * k * (bound % 4)), (bound + k) % how.count, Kind::drain});
             if (leave == 2) how.failures.push_back({0.5 * whole, 0, Kind::join});
-            struct : Record {
-                Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
-                void at(std::uint64_t step, const sim::World& now) override {
-                    Record::at(step, now);
-                    momentum = now.momentum();
-                }
-            } record;
+            MomentumRecord record;
             const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
             SCOPED_TRACE(std::to_string(leave) + " leave, bound " + std::to_string(bound) + record.notes);
             EXPECT_EQ(result.steps, settings.steps);
@@ -252,4 +259,65 @@ TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
             // To rounding: impulses travel as floats, and owners give up what rounding leaves.
             EXPECT_LT((record.momentum - result.outside_impulse).norm(), 1e-9 * weight * 120 / 60);
         }
+}
+// Balls that rebound in a box while workers join and leave, whose steps take now one time and now four. Who joins has not heard what was
+// found before, nor who owned what then.
+TEST(Leaving, AndJoiningOutOfStepKeepTheMomentumOfBallsThatRebound) {
+    const sim::WorldDefinition box = [] {
+        sim::WorldDefinition d = world_test::on_floor();
+        for (const double side : {-1.0, 1.0}) {
+            d.planes.push_back({Eigen::Vector3d(side, 0, 0), -4});
+            d.planes.push_back({Eigen::Vector3d(0, 0, side), -4});
+        }
+        for (int i = 0; i < 40; ++i) {
+            d.bodies.push_back(
+                world_test::ball({-3 + 1.15 * (i % 6), 0.6 + 1.1 * (i / 36), -3 + 1.15 * (i / 6 % 6)}));
+            d.bodies.back().restitution = 0.3 * (i % 3);
+        }
+        return d;
+    }();
+    const double weight = weight_of(sim::World(box));
+    int left = 0, traded = 0;
+    for (const bool leave : {false, true})
+        for (unsigned seed = 0; seed < 30; ++seed) {
+            std::mt19937 random(seed);
+            const auto share = [&random] { return static_cast<double>(random()) / 4294967296.0; };
+            sim::WorldScene scene;
+            scene.world = box;
+            const Eigen::Vector3d start = [&] {
+                for (sim::WorldBody& body : scene.world.bodies) {
+                    body.velocity.x() = 4 * share() - 2;
+                    body.velocity.z() = 4 * share() - 2;
+                }
+                return sim::World(scene.world).momentum();
+            }();
+            sim::DistributedSettings settings = lockstep(200);
+            settings.pace = sim::Pace::bounded;
+            settings.bound = std::array{0, 1, 2, 4, 8, 16, 32, 64}[random() % 8];
+            settings.market.from_step = 3;
+            settings.all_to_first = random() % 3 == 0;
+            sim::SimulatedProcessors how = processors(2 + static_cast<int>(random() % 5));
+            how.latency_s = 1e-5 * std::pow(30, share());
+            how.silence_s = 1e3;
+            how.factor = [seed](int worker, std::uint64_t step) {
+                const std::uint64_t number =
+                    (step / 10 * 31 + static_cast<unsigned>(worker) * 7 + seed) * 2654435761U;
+                return (number >> 16) % 3 == 0 ? 4.0 : 1.0;
+            };
+            for (int i = 1 + static_cast<int>(random() % 4); i > 0; --i) {
+                const Kind kind = leave && random() % 2 == 0 ? Kind::drain : Kind::join;
+                how.failures.push_back(
+                    {0.06 * share(), static_cast<int>(random() % static_cast<unsigned>(how.count)), kind});
+            }
+            MomentumRecord record;
+            const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+            SCOPED_TRACE("seed " + std::to_string(seed) + (leave ? ", some leave: " : ": ") + record.notes);
+            EXPECT_EQ(result.steps, settings.steps);
+            EXPECT_EQ(result.lost, 0);
+            // To rounding, as above.
+            EXPECT_LT((record.momentum - start - result.outside_impulse).norm(), 1e-9 * weight * 200 / 60);
+            left += result.left, traded += static_cast<int>(result.trades);
+        }
+    EXPECT_GT(left, 10);
+    EXPECT_GT(traded, 500);
 }
