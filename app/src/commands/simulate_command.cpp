@@ -74,10 +74,12 @@ void simulate_and_print(const SimulateOptions& options, bool json, bool allow_qu
         result.worker_options
             ? "bodies"
             : fmt::format("{} of {}", result.bodies - result.counts.asleep, counted(result.bodies, "body"));
+    const bool apart = result.worker_options && result.worker_options->pace == sim::Pace::bounded;
     throw std::runtime_error(fmt::format(
-        "{}: error: found {} awake after {} (or events to come), expected rest; allow more --steps, or "
-        "damp what swings and spins (damping_alpha)",
-        result.scene.string(), awake, counted(result.steps, "step")));
+        "{}: error: found {} awake after {} (or events to come), expected rest; {}", result.scene.string(),
+        awake, counted(result.steps, "step"),
+        apart ? "what bodies of several workers hold does not come to rest with --mode async: use --mode sync"
+              : "allow more --steps, or damp what swings and spins (damping_alpha)"));
 }
 
 struct Options : SimulateOptions {
@@ -127,7 +129,8 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     command.option(
         "--threads", o->threads, as::whole(1, kMostThreads),
         "Threads that share out each step; default: one a processor core, 8 at most. With --workers those of "
-        "each that is started here, see `worker`; default 1. No result depends on how many");
+        "each that is started here, see `worker`; default 1. No bit depends on how many, except with --mode "
+        "async");
     add_worker_options(command, o->workers);
     command.flag(
         "--allow-quarantine", o->allow_quarantine,

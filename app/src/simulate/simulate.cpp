@@ -60,8 +60,11 @@ void print_how_to_join(const std::string& endpoint, const fs::path& keys) {
                 options.push_back(" --key " + entry.path().string());
     if (options.empty()) options.emplace_back();
     std::sort(options.begin(), options.end());
+    std::string there = endpoint;
+    for (const std::string_view all : {"tcp://0.0.0.0:", "tcp://*:", "tcp://[::]:"})
+        if (endpoint.starts_with(all)) there = fmt::format("tcp://HOST:{}", endpoint.substr(all.size()));
     for (const std::string& key : options)
-        tell(fmt::format("listening: musicworld worker --connect {}{}", endpoint, key));
+        tell(fmt::format("listening: musicworld worker --connect {}{}", there, key));
 }
 
 sim::DistributedLaunch launch_of(const WorkerOptions& workers, int threads) {

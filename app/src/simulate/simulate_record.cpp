@@ -147,7 +147,13 @@ void SimulateRecord::worked(const sim::WorkerStep& s) {
 }
 
 void SimulateRecord::note(const std::string& what) {
-    if (!from_ || std::ranges::count(result_.notes, what) == 0) result_.notes.push_back(what);
+    if (from_ && std::ranges::count(result_.notes, what) > 0) return;
+    result_.notes.push_back(what);
+    const bool is_usual =
+        !options_.workers || (options_.workers->listen.empty() && what.find(" joins") != std::string::npos);
+    if (is_usual || !options_.progress) return;
+    bar_.clear();
+    tell(fmt::format("{}: note: {}", result_.scene.string(), what));
 }
 
 SimulateResult SimulateRecord::finish(const sim::DistributedResult& run, const WallTimer& wall,

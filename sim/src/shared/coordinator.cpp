@@ -214,6 +214,7 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
             Body& b = bodies_[static_cast<std::size_t>(body)];
             b.epoch = epoch_, b.asked_to = kApplication;
         }
+        if (owner != kApplication) senders_[owner].got = std::max(senders_[owner].got, group.step);
         Ownership message = ownership(group);
         message.from = from;
         message.traded = traded;
@@ -353,8 +354,9 @@ std::vector<std::uint32_t> Coordinator::staying() const {
 void Coordinator::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     leaving_.erase(worker);
-    std::erase_if(asked_,
-                  [worker](const auto& a) { return a.first.first == worker || a.first.second == worker; });
+    for (auto* waits : {&asked_, &bought_})
+        std::erase_if(
+            *waits, [worker](const auto& w) { return w.first.first == worker || w.first.second == worker; });
     for (Body& body : bodies_)
         if (body.asked_to == worker) body.asked_at = 0, body.asked_to = kApplication;
     gone_.push_back(worker);
@@ -375,7 +377,8 @@ void Coordinator::lose(std::uint32_t worker, const std::string& why) {
 }
 
 void Coordinator::note_waiting() {
-    for (auto& [who, for_long] : asked_) for_long = true;
+    for (auto* waits : {&asked_, &bought_})
+        for (auto& [who, for_long] : *waits) for_long = true;
 }
 
 // In bounded pace who holds that one up by telling it nothing, see asked_.
@@ -389,13 +392,20 @@ void Coordinator::lose_slowest(const std::string& why) {
     }
     if (!oldest) return;
     std::uint32_t worker = oldest->owner;
+    const auto has_asked = [this](std::uint32_t from, std::uint32_t to) {
+        const auto asked = asked_.find({from, to});
+        return asked != asked_.end() && asked->second;
+    };
     for (std::set<std::uint32_t> seen = {worker};;) {
-        const auto asked = std::ranges::find_if(asked_, [&](const auto& a) {
-            const auto& [from, to] = a.first;
-            return a.second && from == worker && is_member(to) && !seen.contains(to);
+        const auto next = std::ranges::find_if(members_, [&](std::uint32_t to) {
+            if (seen.contains(to)) return false;
+            const auto bought = bought_.find({worker, to});
+            // Who sold may wait for an answer of the buyer.
+            return has_asked(worker, to) ||
+                   (bought != bought_.end() && bought->second && !has_asked(to, worker));
         });
-        if (asked == asked_.end()) break;
-        worker = asked->first.second;
+        if (next == members_.end()) break;
+        worker = *next;
         seen.insert(worker);
     }
     lose(worker, why);

@@ -44,8 +44,8 @@ public:
     void lose(std::uint32_t worker,
               const std::string& why);  ///< its bodies go to the others; its later messages are dropped
     /// Removes the member whose bodies hold up the others: the one that owns a body of which the oldest state
-    /// is known; or, if that one asked another for what it has not heard, and has no answer, that other. What else it has said, or
-    /// published again, does not count.
+    /// is known; or, if that one asked another for what it has not heard, and has no answer, or waits for bodies of another, that
+    /// other. What else it has said, or published again, does not count.
     void lose_slowest(const std::string& why);
     /// Some time before that: who has no answer by then, and gets none, waits for it.
     void note_waiting();
@@ -78,7 +78,10 @@ private:
         bool settled = false;               ///< bounded: has published the last step again
         std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
         std::size_t messages = 0, message_bytes = 0, offered = 0;  ///< offered: to it, to be answered
-        std::string address;                                       ///< see JoinRequest
+        std::uint64_t got = 0;                                     ///< step at which it got bodies last
+        std::optional<std::pair<std::uint32_t, std::uint32_t>>
+            offer;            ///< its own, to be answered: to whom, number
+        std::string address;  ///< see JoinRequest
         ReachMessage reach;
         DecodedMessage decoded;  ///< the last, for its storage
     };
@@ -116,7 +119,10 @@ private:
     [[nodiscard]] bool fits(std::uint32_t worker, const std::vector<WorldRecord>& records) const;
     [[nodiscard]] bool fits(const std::vector<Mishap>& mishaps) const;
     [[nodiscard]] bool owns_constraint(std::uint32_t worker, int constraint) const;
-    [[nodiscard]] bool asked_for(std::uint32_t worker, const Offer& offer) const;
+    [[nodiscard]] bool may_offer(std::uint32_t worker, const Offer& offer) const;
+    void take_offer(const MessageHeader& header, std::span<const std::uint8_t> bytes, const Offer& offer);
+    void take_answer(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                     const OfferAnswer& answer);
     [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
     static void publish(Body& body, const WorldRecord& record, std::uint64_t step);
 
@@ -169,6 +175,8 @@ private:
     std::deque<PastSale> sales_;  // bounded: see SnapshotMessage
     /// Bounded: who asked whom for what it has not heard of it, and has no answer; whether that was so for long, see note_waiting.
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> asked_;
+    /// Bounded: who waits for bodies that it bought of whom; likewise.
+    std::map<std::pair<std::uint32_t, std::uint32_t>, bool> bought_;
     /// Lockstep: state messages for workers that join later, of steps that the view has not reached.
     std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
     /// Mishaps as workers told them first, by body or constraint.

@@ -78,17 +78,8 @@ void Coordinator::take_message(const MessageHeader& header, std::span<const std:
         return take_state(header, bytes, std::move(*state));
     if (auto* update = std::get_if<UpdateMessage>(&message)) return take_update(header, bytes, *update);
     if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
-    if (const auto* offer = std::get_if<Offer>(&message)) {
-        if (offer->gathers && !asked_for(worker, *offer)) {  // not any more, or never: declined
-            const OfferAnswer no{worker, offer->number, false};
-            queue_.push_back({{worker}, shared(encode({offer->to, epoch_, view_.step()}, no))});
-            return;
-        }
-        if (is_member(offer->to)) ++senders_[offer->to].offered;
-        return take_dealing(header, bytes, offer->to);
-    }
-    if (const auto* answer = std::get_if<OfferAnswer>(&message))
-        return take_dealing(header, bytes, answer->to);
+    if (const auto* offer = std::get_if<Offer>(&message)) return take_offer(header, bytes, *offer);
+    if (const auto* answer = std::get_if<OfferAnswer>(&message)) return take_answer(header, bytes, *answer);
     if (auto* reach = std::get_if<ReachMessage>(&message)) return take_reach(header, std::move(*reach));
     if (auto* relay = std::get_if<RelayMessage>(&message)) return take_relay(header, std::move(*relay));
     if (std::holds_alternative<Beat>(message)) return;
@@ -158,6 +149,34 @@ void Coordinator::take_reach(const MessageHeader& header, ReachMessage&& message
     if (!all.peers.empty()) send({header.worker}, all);
 }
 
+void Coordinator::take_offer(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                             const Offer& offer) {
+    const std::uint32_t worker = header.worker;
+    if (!may_offer(worker, offer)) {  // not any more, or never: declined
+        const OfferAnswer no{worker, offer.number, false};
+        queue_.push_back({{worker}, shared(encode({offer.to, epoch_, view_.step()}, no))});
+        return;
+    }
+    if (is_member(offer.to)) ++senders_[offer.to].offered;
+    senders_[worker].offer = {offer.to, offer.number};
+    take_dealing(header, bytes, offer.to);
+}
+
+// The seller goes on to the step after the one that the buyer says it is at.
+void Coordinator::take_answer(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                              const OfferAnswer& answer) {
+    const bool bounded = settings_.pace == Pace::bounded;
+    const Sender& buyer = senders_[header.worker];
+    if (bounded && header.step > std::max(buyer.step, buyer.got) + 1)
+        return expel(header.worker, "found a step that it has not published");
+    if (!is_member(answer.to)) return;  // it has left meanwhile
+    std::optional<std::pair<std::uint32_t, std::uint32_t>>& offer = senders_[answer.to].offer;
+    if (offer != std::pair(header.worker, answer.number)) return;  // nobody waits for it
+    offer.reset();
+    if (answer.accepted && bounded) bought_[{header.worker, answer.to}] = false;
+    take_dealing(header, bytes, answer.to);
+}
+
 void Coordinator::take_dealing(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                                std::uint32_t to) {
     if (to == header.worker) return refuse(header.worker, "found a dealing with itself");
@@ -184,10 +203,12 @@ bool Coordinator::fits(const std::vector<Mishap>& mishaps) const {
 }
 
 // Since its bodies last changed owners.
-bool Coordinator::asked_for(std::uint32_t worker, const Offer& offer) const {
-    return !offer.bodies.empty() && std::ranges::all_of(offer.bodies, [&](std::uint32_t body) {
-        return owns(worker, body) && bodies_[body].asked_to == offer.to;
-    });
+bool Coordinator::may_offer(std::uint32_t worker, const Offer& offer) const {
+    const auto& before = senders_.at(worker).offer;
+    const bool is_answered = !before || !is_member(before->first);
+    return is_answered && !offer.bodies.empty() && std::ranges::all_of(offer.bodies, [&](std::uint32_t body) {
+               return owns(worker, body) && (!offer.gathers || bodies_[body].asked_to == offer.to);
+           });
 }
 
 bool Coordinator::owns_constraint(std::uint32_t worker, int constraint) const {
@@ -308,6 +329,7 @@ void Coordinator::take_handover(const MessageHeader& header, Handover&& message)
     if (traded) {
         if (!leaving_.contains(header.worker)) ++result_.trades;
         result_.migrations += bodies.size();
+        bought_.erase({message.to, header.worker});
         register_owner(bodies, message.to, header.worker, true);
     } else if (message.to == kApplication && members_.size() > 1) {
         // Of one who leaves: not back to it.

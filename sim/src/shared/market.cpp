@@ -362,11 +362,12 @@ std::optional<Offer> Market::make_offer(const Gather& asked) {
     return offer_;
 }
 
-void Market::answered(std::uint32_t worker, const OfferAnswer& answer) {
-    if (sale_ != Sale::offered || worker != offer_.to || answer.number != offer_.number) return;
+bool Market::answered(std::uint32_t worker, const OfferAnswer& answer) {
+    if (sale_ != Sale::offered || worker != offer_.to || answer.number != offer_.number) return false;
     workers_[worker].answers = true;
     sale_ = answer.accepted ? Sale::accepted : Sale::none;
     if (!answer.accepted) carried_ = 0, not_before_ = std::max(not_before_, step_ + kDeclinedSteps);
+    return answer.accepted;
 }
 
 std::optional<Offer> Market::hand_over() {

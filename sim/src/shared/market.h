@@ -68,7 +68,8 @@ public:
     void stop_waiting() { patient_ = false; }  ///< for the answer to the offer that is under way
     /// An offer of these own bodies to a member, whatever they cost there.
     [[nodiscard]] std::optional<Offer> make_offer(const Gather& asked);
-    void answered(std::uint32_t worker, const OfferAnswer& answer);
+    /// Whether that is sold which is on offer.
+    bool answered(std::uint32_t worker, const OfferAnswer& answer);
     /// The offer that was accepted, if one was; counts as handed over.
     [[nodiscard]] std::optional<Offer> hand_over();
 

@@ -124,8 +124,7 @@ void SharedWorldWorker::take_message(const MessageHeader& header, Offer&& messag
 }
 
 void SharedWorldWorker::take_message(const MessageHeader& header, OfferAnswer&& message) {
-    market_.answered(header.worker, message);
-    handover_step_ = header.step + 1;
+    if (market_.answered(header.worker, message)) handover_step_ = header.step + 1;
 }
 
 // What was asked for last counts.

@@ -137,7 +137,9 @@ private:
         settings.in_folder =
             launch.listen.empty() || (launch.processes.count > 0 && !launch.processes.program.empty());
         const auto bodies = static_cast<int>(scene.world.bodies.size() + scene.later.size());
-        settings.most_waiting = 1000 + 4 * bodies + 4 * (run.bound + 2) * kMostWorkers;
+        // Nobody waits for who owns nothing: while it is silent, but not for too long, steps of few bodies are many.
+        settings.most_waiting =
+            1000 + 4 * bodies + 4 * (run.bound + 2) * kMostWorkers + 500'000 / std::max(bodies, 1);
         settings.largest_message = largest_message(scene);
         if (!launch.keys.empty()) settings.keys = read_application_keys(launch.keys);
         return settings;
@@ -176,6 +178,7 @@ private:
             for (WorkerGate::Event& event : gate_.wait(kWait)) take(event);
             look_after_children();
             pass_on();
+            note_refusals();
             if (seconds_since(start) > launch_.wait_s) return go_without_the_rest(wanted);
         }
     }
@@ -284,8 +287,14 @@ private:
     }
 
     void note_refusals() {
-        if (std::exchange(noted_, noted_ || gate_.refused_messages() + gate_.refused_keys() > 0) != noted_)
-            observer_.note("messages that are none of ours, or peers without a key, are dropped and counted");
+        if (!keys_noted_ && gate_.refused_keys() > 0) {
+            keys_noted_ = true;
+            observer_.note("a worker without a key that is allowed here asks to join: it is not answered");
+        }
+        if (!noted_ && gate_.refused_messages() > 0) {
+            noted_ = true;
+            observer_.note("messages that are none of ours are dropped and counted");
+        }
     }
 
     void end_children() {
@@ -311,7 +320,7 @@ private:
     std::pair<std::uint64_t, int> progress_;  ///< steps, bodies that went to others after losses
     Clock::time_point progressed_ = Clock::now();
     bool waiting_noted_ = false;  // since then
-    bool noted_ = false;
+    bool noted_ = false, keys_noted_ = false;
     std::vector<Child> children_;  // last: processes end before the gate goes
 };
 

@@ -12,6 +12,7 @@
 #include "sim/errors.h"
 #include "struck/stepped_body.h"
 #include "workers/heartbeat.h"
+#include "workers/leave_signals.h"
 #include "workers/socket_folder.h"
 #include "workers/worker_process.h"
 #include "workers/world_service.h"
@@ -112,11 +113,18 @@ int serve(const WorldLink& link, DecodedMessage&& first) {
     if (const auto* scene = std::get_if<SceneMessage>(&first.message)) return serve_world(link, *scene);
     if (std::holds_alternative<StruckAssign>(first.message)) {
         link.pulse.joined(first.header.worker);
+        stop_listening_for_leave();
         return KitWorker(link.socket, link.pulse).serve(std::move(first));
     }
     if (const auto* refusal = std::get_if<Refusal>(&first.message))
         std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
     return std::holds_alternative<EndOfRun>(first.message) ? 0 : 1;
+}
+
+// ZeroMQ does not say which of both it is.
+std::string keys_may_be_wrong(bool with_key) {
+    return with_key ? ": nobody listens there, without or with other keys, or it does not allow this one"
+                    : ": nobody listens there, or only to workers with keys (--key)";
 }
 
 int serve(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys,
@@ -125,6 +133,7 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
     socket.set(zmq::sockopt::rcvtimeo, kLookMs);
     const Secret secret = own_secret();
     Pulse pulse(context, endpoint, keys, secret);
+    listen_for_leave();  // who has asked to join leaves in order
     send(socket, join_request(secret));
     zmq::message_t frame;
     int status = 1;
@@ -137,7 +146,8 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
             throw WorkerError(std::string("bad message: ") + e.what());
         }
     } else if (!pulse.application_gone()) {
-        throw WorkerError("no answer from " + endpoint + " within 10 s");
+        throw WorkerError("no answer from " + endpoint + " within 10 s" +
+                          (endpoint.starts_with("tcp") ? keys_may_be_wrong(keys.has_value()) : ""));
     }
     if (status != 0 && pulse.application_gone()) {
         std::fprintf(stderr, "worker: the application is gone, or has given this worker up\n");

@@ -97,7 +97,7 @@ void WorkerGate::open_door(const Settings& settings) {
         listening_.emplace(context_, router_, listen);
     } catch (const zmq::error_t& e) {
         throw InputError("cannot listen at " + settings.listen + ": " + e.what() +
-                         "; choose a free port of an address of this machine");
+                         "; choose a free port of an address of this machine (a number, not a name)");
     }
     endpoint_ = router_.get(zmq::sockopt::last_endpoint);
 }

@@ -1,10 +1,7 @@
 #include "workers/world_service.h"
 
-#include <signal.h>
-
 #include <array>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <optional>
 #include <utility>
@@ -13,6 +10,7 @@
 #include "shared/shared_world_worker.h"
 #include "sim/errors.h"
 #include "workers/elapsed.h"
+#include "workers/leave_signals.h"
 #include "workers/peer_links.h"
 #include "workers/through_signals.h"
 #include "world/processor_time.h"
@@ -26,17 +24,6 @@ constexpr std::size_t kMostPartsInOneGo = 4096;
 constexpr double kLongestWithin = 2;       // that a step waits for others [s]; then it is done alone
 constexpr double kLongestForAnswer = 0.5;  // that the next step waits for the answer to an offer [s]
 constexpr double kLongestToLeave = 3;      // that who leaves waits until others have heard all [s]
-
-volatile std::sig_atomic_t drain_asked = 0;
-
-/// SIGTERM and SIGINT ask once for a drain; a second one ends the process.
-void listen_for_drain() {
-    struct sigaction action {};
-    action.sa_handler = [](int) { drain_asked = 1; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigaction(SIGTERM, &action, nullptr);
-    sigaction(SIGINT, &action, nullptr);
-}
 
 /// Messages that one worker tells another of a step, at most. In bounded pace who has nothing, and does no steps, tells of sales.
 std::size_t most_told(const SceneMessage& scene) {
@@ -81,7 +68,7 @@ private:
     int serve_steps() {
         while (!worker_.ended() && !pulse_.application_gone()) {
             take_all();
-            if (drain_asked && !std::exchange(draining_, true)) worker_.drain();
+            if (leave_asked() && !std::exchange(draining_, true)) worker_.drain();
             look_after_offer();
             look_after_others();
             if (!worker_.ended() && worker_.ready()) step();
@@ -219,7 +206,6 @@ private:
 
 int serve_world(const WorldLink& link, const SceneMessage& scene) {
     link.pulse.joined(scene.worker);
-    listen_for_drain();
     WorldService service(link, scene);
     try {
         return service.serve();

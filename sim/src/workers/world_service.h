@@ -14,7 +14,7 @@ struct WorldLink {
     int threads;  ///< of a step
 };
 
-/// Serves a world: a SharedWorldWorker behind sockets. SIGTERM and SIGINT drain. Returns the exit status: 0 at the run's
+/// Serves a world: a SharedWorldWorker behind sockets; drains when asked to leave (leave_signals.h). Returns the exit status: 0 at the run's
 /// end or when drained, 1 when refused or when the application is gone.
 [[nodiscard]] int serve_world(const WorldLink& link, const SceneMessage& scene);
 

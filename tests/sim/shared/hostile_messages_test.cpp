@@ -240,7 +240,8 @@ TEST(Offers, ForAStructureThatNobodyAskedForReachNobody) {
     for (int i = 0; i < 2; ++i) (void)meeting.join({});
     meeting.start();
     (void)meeting.outgoing();
-    const std::uint32_t own = meeting.owner(0) == 0 ? 0 : 1;
+    std::uint32_t own = 0;
+    while (meeting.owner(static_cast<int>(own)) != 0) ++own;
     // Of a body, of none, and one as usual.
     const std::vector<Offer> offers = {
         {1, 1, {own}, {0.1F}, true}, {1, 2, {}, {}, true}, {1, 3, {own}, {0.1F}, false}};
@@ -256,6 +257,54 @@ TEST(Offers, ForAStructureThatNobodyAskedForReachNobody) {
         EXPECT_EQ(message.header.worker, 1u);  // as if that one had declined: the seller goes on
         EXPECT_EQ(answer->number, offer.number);
         EXPECT_FALSE(answer->accepted);
+    }
+}
+
+// Who bought waits for it, and is not given up for that.
+TEST(Offers, WhoNeverHandsOverWhatItSoldIsGivenUp) {
+    for (const std::uint32_t liar : {0u, 1u, 2u}) {
+        Three three;
+        bool offered = false;
+        three.more = [&](Coordinator& meeting, std::uint32_t number, SharedWorldWorker& worker) {
+            if (number != liar || worker.steps_done() < 10 || offered) return;
+            for (std::uint32_t body = 0; body < 14; ++body) {
+                if (meeting.owner(static_cast<int>(body)) != liar) continue;
+                offered = true;
+                for (const std::uint32_t to : {(liar + 1) % 3, (liar + 2) % 3}) {
+                    meeting.take(liar,
+                                 encode({liar, 0, worker.steps_done()}, Offer{to, 99, {body}, {1e-9F}}));
+                    meeting.advance();
+                }
+                return;
+            }
+        };
+        three.run([](std::uint32_t, std::uint32_t, const WorkerMessage&, bool) { return true; });
+        EXPECT_TRUE(offered);
+        EXPECT_EQ(std::ranges::count(three.members, liar), 0) << three.record.notes;
+        EXPECT_EQ(three.members.size(), 2u) << three.record.notes;
+    }
+}
+
+// Offers of nothing, and answers to offers that nobody made, from a step to come or a past one.
+TEST(Offers, OfNothingAndAnswersThatNobodyWaitsForHaveNobodyElseGivenUp) {
+    for (const int kind : {0, 1, 2}) {
+        Three three;
+        int told = 0;
+        three.more = [&](Coordinator& meeting, std::uint32_t number, SharedWorldWorker& worker) {
+            if (number != 2 || worker.steps_done() < 3 || told > 40 || !meeting.is_member(2)) return;
+            for (const std::uint32_t to : {0u, 1u}) {
+                const OfferAnswer answer{to, static_cast<std::uint32_t>(told / 4), true};
+                const WorkerMessage message = kind == 0 ? WorkerMessage(Offer{to, 9, {}, {}}) : answer;
+                if (!meeting.is_member(2)) return;
+                meeting.take(2, encode({2, 0, kind == 2 ? 60 : worker.steps_done()}, message));
+                meeting.advance();
+                ++told;
+            }
+        };
+        three.run([](std::uint32_t, std::uint32_t, const WorkerMessage&, bool) { return true; });
+        EXPECT_GT(told, kind == 2 ? 0 : 40);
+        EXPECT_EQ(std::ranges::count(three.members, 0u) + std::ranges::count(three.members, 1u), 2)
+            << three.record.notes;
     }
 }
 

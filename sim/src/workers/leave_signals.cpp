@@ -1,0 +1,42 @@
+#include "workers/leave_signals.h"
+
+#include <signal.h>
+
+#include <array>
+#include <csignal>
+
+namespace sim {
+namespace {
+
+constexpr std::array kSignals{SIGTERM, SIGINT, SIGHUP};
+volatile std::sig_atomic_t asked = 0;  // by which
+
+}  // namespace
+
+void listen_for_leave() {
+    struct sigaction action {};
+    action.sa_handler = [](int signal) { asked = signal; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    for (const int signal : kSignals) {
+        struct sigaction before {};
+        sigaction(signal, nullptr, &before);
+        if (signal != SIGHUP || before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
+    }
+}
+
+bool leave_asked() {
+    return asked != 0;
+}
+
+void stop_listening_for_leave() {
+    struct sigaction action {};
+    action.sa_handler = SIG_DFL;
+    for (const int signal : kSignals) {
+        struct sigaction before {};
+        sigaction(signal, nullptr, &before);
+        if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
+    }
+    if (asked != 0) raise(asked);
+}
+
+}  // namespace sim
