@@ -8,6 +8,7 @@
 #include <update_throughput.h>
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -464,7 +465,10 @@ WorkersBench bench_workers(const WorkersBenchOptions& options, const Progress& p
     WorkersBenchRun run(options, progress);
     for (const auto& [name, measure] : kParts)
         if (options.only.empty() || options.only.contains(name)) (run.*measure)();
-    run.note_clock();
+    const auto is_chosen = [&](const char* name) { return options.only.contains(name); };
+    if (options.only.empty() ||
+        std::ranges::any_of(std::array{"speedup", "stragglers", "bound", "migration"}, is_chosen))
+        run.note_clock();
     return run.result();
 }
 

@@ -55,8 +55,10 @@ void add_bench_options(Command& program, BenchOptions& o) {
     program.option("--steps", o.workers.steps, as::whole(1, 1000000), "workers: of each run");
     program.option("--bound", o.workers.bound, as::whole(1, 64, "steps"),
                    "workers: how far one may be ahead");
-    program.option("--processors", o.workers.processors, as::processors(),
-                   "workers: simulated[:latency=S,slowdown=X,cost=measured|modelled]");
+    program.option(
+        "--processors", o.workers.processors, as::processors(),
+        "workers: simulated[:latency=S,slowdown=X,cost=measured|modelled], of speedup, stragglers, bound, "
+        "migration");
     program.option<std::vector<std::string>>(
         "--only", as::list_of(as::choice(kWorkersBenchParts)), "workers: some parts",
         [&o](const std::vector<std::string>& parts) {
