@@ -7,6 +7,7 @@
 #include <future>
 #include <mutex>
 #include <random>
+#include <thread>
 
 #include "hostile_member.h"
 #include "key_folder.h"
@@ -73,13 +74,35 @@ TEST(SharedWorldRun, AStoppedWorkerIsGivenUpAndTheBitsStay) {
 
 TEST(SharedWorldRun, AWorkerThatIsToldToEndGivesItsBodiesAwayAndNoneIsLost) {
     const sim::WorldScene scene = heap(9);
-    Watcher watcher;
-    watcher.act_at = {10};
-    watcher.act = [] { ::kill(children_of(getpid()).front(), SIGTERM); };
-    const sim::DistributedResult result = sim::run_distributed(scene, lockstep(400), processes(2), watcher);
-    EXPECT_EQ(watcher.hash, hash_alone(scene, 400));
-    EXPECT_EQ(result.lost, 0) << testing::PrintToString(watcher.notes);
-    EXPECT_EQ(result.left, 1);
+    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
+        Watcher watcher;
+        watcher.act_at = {10};
+        watcher.act = [signal] { ::kill(children_of(getpid()).front(), signal); };
+        const sim::DistributedResult result =
+            sim::run_distributed(scene, lockstep(400), processes(2), watcher);
+        EXPECT_EQ(watcher.hash, hash_alone(scene, 400));
+        EXPECT_EQ(result.lost, 0) << signal << testing::PrintToString(watcher.notes);
+        EXPECT_EQ(result.left, 1);
+    }
+}
+
+// As it starts it has not asked to join, and from then on it leaves in order.
+TEST(SharedWorldRun, AWorkerThatIsToldToEndAsItJoinsIsNotLost) {
+    const sim::WorldScene scene = heap(9);
+    const std::uint64_t hash = hash_alone(scene, 400);
+    for (int run = 0; run < 12; ++run) {
+        Watcher watcher;
+        std::jthread teller([run] {
+            std::vector<pid_t> children;
+            while ((children = children_of(getpid())).empty()) std::this_thread::sleep_for(100us);
+            std::this_thread::sleep_for(run * 4ms);
+            ::kill(children.front(), SIGTERM);
+        });
+        const sim::DistributedResult result =
+            sim::run_distributed(scene, lockstep(400), processes(2), watcher);
+        EXPECT_EQ(watcher.hash, hash) << run;
+        EXPECT_EQ(result.lost, 0) << run << testing::PrintToString(watcher.notes);
+    }
 }
 
 TEST(SharedWorldRun, AWorkerThatJoinsLateTakesPart) {
