@@ -59,7 +59,9 @@ public:
     [[nodiscard]] bool at_end() const override { return step_ >= settings_.steps; }
     [[nodiscard]] bool done() const override { return at_end() && settled_; }
     [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
-    [[nodiscard]] bool has_nothing() const override { return owned_.empty() && later_.empty(); }
+    [[nodiscard]] bool has_nothing() const override {
+        return owned_.empty() && later_.empty() && !owners_follow_;
+    }
     [[nodiscard]] int lead() const override;
     [[nodiscard]] int ghost_age() const override { return ghost_age_; }
     [[nodiscard]] const World& world() const override { return world_; }

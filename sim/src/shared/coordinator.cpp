@@ -159,17 +159,17 @@ void Coordinator::start() {
         std::ranges::sort(all);
         orphans_.emplace_back(kApplication, std::move(all));
     } else {
-        const int workers = settings_.all_to_first ? 1 : static_cast<int>(members_.size());
+        const std::vector<std::uint32_t> stay = staying(), &owners = stay.empty() ? members_ : stay;
+        const int workers = settings_.all_to_first ? 1 : static_cast<int>(owners.size());
         const std::vector<std::vector<int>> lots = whole_lots();
         const std::vector<int> first = first_owners(
             columns_, lots, settings_.pace == Pace::lockstep ? first_places_ : places(lots), workers);
-        std::vector<std::vector<int>> bodies(members_.size());
+        std::vector<std::vector<int>> bodies(owners.size());
         for (std::size_t i = 0; i < lots.size(); ++i) {
             auto& mine = bodies[static_cast<std::size_t>(first[i])];
             mine.insert(mine.end(), lots[i].begin(), lots[i].end());
         }
-        for (std::size_t i = 0; i < members_.size(); ++i)
-            register_owner(bodies[i], members_[i], kApplication);
+        for (std::size_t i = 0; i < owners.size(); ++i) register_owner(bodies[i], owners[i], kApplication);
     }
     send(members_, Members{members_});
     advance();

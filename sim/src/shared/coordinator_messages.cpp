@@ -85,8 +85,9 @@ void Coordinator::take_message(const MessageHeader& header, std::span<const std:
     if (std::holds_alternative<Beat>(message)) return;
     if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
     if (std::holds_alternative<Leaves>(message) && settings_.pace == Pace::bounded) {
-        if (leaving_.insert(worker).second) ask_who_leaves();
-        return;
+        if (!leaving_.insert(worker).second) return;
+        if (!started_) return send({worker}, Gather{kApplication, {}});  // it gets nothing
+        return ask_who_leaves();
     }
     if (std::holds_alternative<Drained>(message)) {
         observer_->note(name(worker) + " leaves");

@@ -1,11 +1,13 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <span>
+#include <utility>
 
 #include "messages/worker_messages.h"
 #include "sim/distributed_world.h"
@@ -21,7 +23,7 @@ namespace sim {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kAnswerWithin = 10s;
+constexpr auto kAnswerWithin = 10s, kLeaveWithin = 1s;
 constexpr int kLookMs = 100, kLingerMs = 500;
 
 void send(zmq::socket_t& socket, const std::vector<std::uint8_t>& bytes) {
@@ -87,11 +89,15 @@ private:
     std::map<std::uint32_t, SteppedBody> bodies_;
 };
 
-/// Until the application has answered.
+/// Until the application has answered. Who is told to leave waits only for an answer that may be under way.
 bool wait_for_answer(zmq::socket_t& socket, const Pulse& pulse, zmq::message_t& frame) {
-    const auto started = std::chrono::steady_clock::now();
-    while (!pulse.application_gone() && std::chrono::steady_clock::now() - started < kAnswerWithin)
+    auto until = std::chrono::steady_clock::now() + kAnswerWithin;
+    bool leaves = false;
+    while (!pulse.application_gone() && std::chrono::steady_clock::now() < until) {
         if (receive(socket, frame)) return true;
+        if (leave_asked() && !std::exchange(leaves, true))
+            until = std::min(until, std::chrono::steady_clock::now() + kLeaveWithin);
+    }
     return false;
 }
 
@@ -145,6 +151,8 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
             send(socket, encode({}, WorkerFailure{e.what()}));
             throw WorkerError(std::string("bad message: ") + e.what());
         }
+    } else if (leave_asked()) {
+        stop_listening_for_leave();
     } else if (!pulse.application_gone()) {
         throw WorkerError("no answer from " + endpoint + " within 10 s" +
                           (endpoint.starts_with("tcp") ? keys_may_be_wrong(keys.has_value()) : ""));

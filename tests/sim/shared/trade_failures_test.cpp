@@ -3,6 +3,9 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <deque>
+#include <map>
+#include <memory>
 #include <random>
 #include <string>
 
@@ -260,6 +263,68 @@ TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
             EXPECT_LT((record.momentum - result.outside_impulse).norm(), 1e-9 * weight * 120 / 60);
         }
 }
+// Its messages come at once, or only when the others have done some steps.
+TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
+    for (const std::size_t late_by : {std::size_t{0}, std::size_t{3}, std::size_t{8}}) {
+        sim::WorldScene scene;
+        scene.world = world_test::on_floor();
+        for (int i = 0; i < 27; ++i)
+            scene.world.bodies.push_back(world_test::ball({3.0 * (i % 9), 4, 3.0 * (i / 9)}));
+        sim::DistributedSettings settings = lockstep(120);
+        settings.pace = sim::Pace::bounded, settings.bound = 16;
+        struct : Record {
+            Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+            void ready(std::uint64_t, const sim::World& world) override { momentum = world.momentum(); }
+        } record;
+        sim::Coordinator meeting(scene, settings, record);
+        std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
+        std::deque<std::pair<std::size_t, std::vector<std::uint8_t>>> late;  // of worker 0, by rounds
+        std::size_t round = 0;
+        const auto deliver = [&] {
+            for (bool more = true; more;) {
+                more = false;
+                for (; !late.empty() && late.front().first <= round; late.pop_front())
+                    meeting.take(0, late.front().second), meeting.advance();
+                for (const sim::Coordinator::Outgoing& out : meeting.outgoing())
+                    for (const std::uint32_t to : out.to) {
+                        more = true;
+                        sim::DecodedMessage message = sim::decode_message(*out.bytes);
+                        if (const auto* of = std::get_if<sim::SceneMessage>(&message.message))
+                            workers[to] = std::make_unique<sim::SharedWorldWorker>(*of);
+                        else
+                            workers.at(to)->take(message.header, std::move(message.message));
+                    }
+                for (auto& [number, worker] : workers)
+                    for (sim::SharedWorldWorker::Outgoing& out : worker->outgoing()) {
+                        more = true;
+                        std::vector<std::uint8_t> bytes =
+                            out.to.empty() ? out.bytes : worker->relayed(out.to, out.bytes);
+                        if (number == 0)
+                            late.emplace_back(round + late_by, std::move(bytes));
+                        else
+                            meeting.take(number, bytes), meeting.advance();
+                    }
+            }
+        };
+        for (int i = 0; i < 3; ++i) (void)meeting.join({});
+        deliver();
+        workers.at(0)->drain();
+        deliver();
+        meeting.start();
+        for (; !meeting.finished() && round < 2000; ++round) {
+            deliver();
+            for (auto& [number, worker] : workers)
+                if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3});
+        }
+        SCOPED_TRACE(std::to_string(late_by) + " rounds late: " + record.notes);
+        EXPECT_EQ(meeting.result().left, 1);
+        EXPECT_EQ(meeting.result().lost, 0);
+        EXPECT_EQ(meeting.steps(), 120u);
+        const double weight = weight_of(sim::World(scene.world));
+        EXPECT_LT((record.momentum - meeting.result().outside_impulse).norm(), 1e-9 * weight * 120 / 60);
+    }
+}
+
 // Balls that rebound in a box while workers join and leave, whose steps take now one time and now four. Who joins has not heard what was
 // found before, nor who owned what then.
 TEST(Leaving, AndJoiningOutOfStepKeepTheMomentumOfBallsThatRebound) {
