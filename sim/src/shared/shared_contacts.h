@@ -24,7 +24,7 @@ namespace sim {
 ///
 /// A blow (a rebound) is not split: two owners may see it in different steps, and half of each would be no rebound. If either finds one
 /// in a step, what the owner of the body with the lower number found in that step counts, as a whole: perhaps nothing, and then that
-/// owner meets the other body as it was (ForeignBodies::owed). So what counts follows from the step alone, and whoever
+/// owner meets the other body as it should be (ForeignBodies::add_owed). So what counts follows from the step alone, and whoever
 /// compares finds the same; of a body that was just bought once it has heard what others found at it (FoundMessage).
 class SharedContacts {
 public:
