@@ -272,10 +272,7 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
             scene.world.bodies.push_back(world_test::ball({3.0 * (i % 9), 4, 3.0 * (i / 9)}));
         sim::DistributedSettings settings = lockstep(120);
         settings.pace = sim::Pace::bounded, settings.bound = 16;
-        struct : Record {
-            Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
-            void ready(std::uint64_t, const sim::World& world) override { momentum = world.momentum(); }
-        } record;
+        MomentumRecord record;
         sim::Coordinator meeting(scene, settings, record);
         std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
         std::deque<std::pair<std::size_t, std::vector<std::uint8_t>>> late;  // of worker 0, by rounds
