@@ -216,8 +216,6 @@ struct ForeignBall {
     double radius;  ///< of the body, plus the distance it may travel [m]
 };
 
-class Partners;
-
 /// How a world is shared with worlds of other processes that hold the same bodies.
 enum class Sharing {
     alone,  ///< every body is stepped, whoever owns it
@@ -270,11 +268,8 @@ public:
     World& operator=(World&&) noexcept;
 
     void step();  ///< by settings().dt; allocates nothing once its buffers have grown
-    /// step() by several who each have all of this world, with the same bits; by one, if there is no other. Throws NotTogether
-    /// or DecodeError where it comes to no end so: the world is as it was before then.
-    void step_together(Partners& with);
-    /// So many threads share out the world's steps, at first one: this one and helpers that sleep between steps. (What several
-    /// partners do together, each does with one.) No result depends on how many. Throws std::invalid_argument below 1.
+    /// So many threads share out the world's steps, at first one: this one and helpers that sleep between steps. No result
+    /// depends on how many. Throws std::invalid_argument below 1.
     void use_threads(int threads);
     /// Instead, for benchmarks: this thread does alone what so many would share out, and times each piece of it. The
     /// processor time of steps less what saved_by_threads_s() grows by is then their critical path among so many

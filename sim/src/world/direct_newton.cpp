@@ -59,7 +59,6 @@ Eigen::Vector3d IslandSolver::impulse_of(const DirectContact& c, const Eigen::Ve
 
 // Of 1/2 |y - start|^2 + what the springs and contacts hold, and the impulses at y.
 void IslandSolver::gradient() {
-    effort_ += 4 * static_cast<double>(wide_rows_.size());
     for (std::size_t i = 0; i < wide_y_.size(); ++i) gradient_[i] = wide_y_[i] - wide_start_[i];
     for (SpringRows& s : springs_) {
         s.impulse = -(seen(s, wide_y_) + s.offset) / s.gamma;
@@ -111,7 +110,6 @@ void IslandSolver::assemble() {
         if (!c.weight.isZero(0)) add(contacts_[i], c.weight);
     }
     factor_.factor();
-    effort_ += factor_cost_;
 }
 
 // Newton's method; where a step overshoots, its length is found by false position. Strictly convex: there is one minimum.

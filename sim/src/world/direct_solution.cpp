@@ -53,11 +53,11 @@ bool IslandSolver::may_go_directly(double most, bool must) {
         for (const SpringRows& s : springs_) factor_.couple(s.side[0].body, s.side[1].body);
     };
     couple(true);
-    with_contacts_ = factor_.least_cost() <= most && std::isfinite(factor_cost_ = factor_.analyse(most));
+    with_contacts_ = factor_.least_cost() <= most && std::isfinite(factor_.analyse(most));
     if (with_contacts_) return true;
     if (!must && springs_soft_) return false;
     couple(false);
-    factor_cost_ = factor_.analyse(std::numeric_limits<double>::infinity());
+    (void)factor_.analyse(std::numeric_limits<double>::infinity());
     return true;
 }
 
@@ -455,8 +455,6 @@ bool IslandSolver::springs_are_soft() {
 void IslandSolver::pull_springs() {
     const double half = h_ / 2;
     for (SpringRows& s : springs_) {
-        if (with_ && !concerns_this(s)) continue;
-        const Eigen::Vector3d outside = outside_;
         write_spring(s);
         const PointConstraint& held = s.constraint->definition;
         const double own = mobility_of(s);
@@ -471,7 +469,6 @@ void IslandSolver::pull_springs() {
         const Eigen::Vector3d impulse = in_world(s, s.impulse);
         if (s.told) tell(s, -1, impulse, p, s.place);
         apply(s, impulse, s.place, outside_);
-        if (with_ && !counts_here(s)) outside_ = outside;
     }
 }
 

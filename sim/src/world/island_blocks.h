@@ -46,18 +46,11 @@ public:
     [[nodiscard]] std::span<const std::uint32_t> bodies_of(std::size_t slab) const {
         return std::span(bodies_).subspan(first_body_[slab], first_body_[slab + 1] - first_body_[slab]);
     }
-    [[nodiscard]] std::size_t slab_of(std::size_t body) const { return slab_of_[body]; }
     /// Manifolds of a block, ascending.
     [[nodiscard]] std::span<const int> manifolds_of(std::size_t block) const {
         return std::span(manifolds_)
             .subspan(first_manifold_[block], first_manifold_[block + 1] - first_manifold_[block]);
     }
-    /// Block of the contacts between a slab and the next.
-    [[nodiscard]] std::size_t interface_after(std::size_t slab) const noexcept {
-        return slabs() + (slab % 2 == 0 ? slab / 2 : slabs() / 2 + slab / 2);
-    }
-    /// Whether contacts reach beyond neighbouring slabs.
-    [[nodiscard]] bool reaches_further() const noexcept { return blocks_.size() > 2 * slabs() - 1; }
     void set_contacts(std::size_t block, std::size_t first, std::size_t last) {
         blocks_[block].first = static_cast<std::uint32_t>(first);
         blocks_[block].last = static_cast<std::uint32_t>(last);
@@ -129,6 +122,10 @@ private:
     void end(const Block& block, const Phase& phase, bool of_bodies);
     void set_slabs(std::span<const Body> bodies, std::span<const int> manifolds,
                    const std::vector<Manifold>& all, const std::vector<int>& local);
+    /// Block of the contacts between a slab and the next.
+    [[nodiscard]] std::size_t interface_after(std::size_t slab) const noexcept {
+        return slabs() + (slab % 2 == 0 ? slab / 2 : slabs() / 2 + slab / 2);
+    }
     void add_block(std::uint32_t slab, std::uint32_t slabs);
 
     std::vector<Block> blocks_;

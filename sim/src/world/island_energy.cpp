@@ -136,10 +136,6 @@ double IslandSolver::energy(bool directly) {
     });
     double sum = 0;
     for (const Measure& m : measures_) sum += m.energy;
-    return with_springs(sum, directly);
-}
-
-double IslandSolver::with_springs(double sum, bool directly) const {
     for (const SpringRows& s : springs_) sum += energy_of(s, directly);
     return sum;
 }

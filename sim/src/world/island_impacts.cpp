@@ -96,19 +96,13 @@ bool IslandSolver::is_elsewhere(const ContactRows& c, double time) const {
     return apart.norm() > kSlow * size_of(c);
 }
 
-// The contacts of each body; together those that this partner sweeps, and all impacts that concern it.
+// The contacts of each body.
 void IslandSolver::list_contacts() {
     first_contact_.assign(rows_of_.size() + 1, 0);
     auto each = [this](auto visit) {
-        auto visit_contact = [&](std::size_t i) {
+        for (std::size_t i = 0; i < contacts_.size(); ++i)
             for (const Side& side : contacts_[i].side)
                 if (side.body >= 0) visit(static_cast<std::size_t>(side.body), i);
-        };
-        if (!with_)
-            for (std::size_t i = 0; i < contacts_.size(); ++i) visit_contact(i);
-        for (std::size_t b = 0; with_ && b < blocks_.size(); ++b)
-            for (std::size_t i = blocks_[b].first; i < blocks_[b].last; ++i)
-                if (shares_.sweeps(blocks_[b]) || (parts_[b].impacts && contacts_[i].firm)) visit_contact(i);
     };
     each([this](std::size_t body, std::size_t) { ++first_contact_[body + 1]; });
     for (std::size_t i = 1; i < first_contact_.size(); ++i) first_contact_[i] += first_contact_[i - 1];
@@ -142,7 +136,6 @@ void IslandSolver::strike(const Hit& hit) {
     for (const Side& side : seed.side)
         if (side.body >= 0) time = std::max(time, rows_of_[static_cast<std::size_t>(side.body)].time);
     any_struck_ = true;
-    const Eigen::Vector3d outside = outside_;
     hit_bodies_.clear(), struck_.clear();
     for (const Side& side : seed.side)
         if (side.body >= 0) reach(side.body, time);
@@ -170,7 +163,6 @@ void IslandSolver::strike(const Hit& hit) {
         for (float& half : c.at_move) half *= 0.5f;  // directly
         c.largest = c.taken = c.approach = 0;
     }
-    if (with_ && !counts_here(seed)) outside_ = outside;
 }
 
 // Takes a body into the impact.
@@ -437,18 +429,15 @@ void IslandSolver::stretch_gap(ContactRows& c) const {
 // follow the place where they act, too.
 void IslandSolver::turn_frames(const IslandBlocks::Block& slab) {
     for (const std::uint32_t body : blocks_.bodies_of(slab.slab)) {
-        rows_of_[body].turned = false;
-        turn_frame_on(rows_of_[body]);
+        BodyRows& rows = rows_of_[body];
+        rows.turned = false;
+        const Eigen::Vector3d& root = rows.body->kind->root_inertia;
+        if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) continue;  // alike in all frames
+        const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
+        if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) continue;
+        rows.turned = true;
+        turn_frame(rows, now);
     }
-}
-
-void IslandSolver::turn_frame_on(BodyRows& rows) {
-    const Eigen::Vector3d& root = rows.body->kind->root_inertia;
-    if (root.maxCoeff() - root.minCoeff() < 1e-6 * root.maxCoeff()) return;  // alike in all frames
-    const Eigen::Matrix3d now = rows.body->state.orientation.toRotationMatrix();
-    if ((now - rows.frame).squaredNorm() < 2 * kFrameTurn * kFrameTurn) return;
-    rows.turned = true;
-    turn_frame(rows, now);
 }
 
 void IslandSolver::turn_rows(const IslandBlocks::Block& block) {

@@ -5,7 +5,6 @@
 
 #include "world/island_solver.h"
 #include "world/row_kernels.h"
-#include "world/step_records.h"
 
 // What an island's rows are made of; island_solver.cpp sweeps over them.
 
@@ -54,7 +53,7 @@ void IslandSolver::begin(const Island& island) {
     std::fill_n(moved_.data(), offset, 0.f);
 
     found_again_ = false, fresh_ = true;
-    if (!with_) note_places();
+    note_places();
     add_contacts(island);
     for (const int c : island.constraints) {
         HeldConstraint& held = (*constraints_)[static_cast<std::size_t>(c)];
@@ -63,7 +62,7 @@ void IslandSolver::begin(const Island& island) {
     springs_soft_ = springs_are_soft();
     pushed_.clear();
     for (std::size_t i = 0; i < rows_of_.size() && !forces_->empty(); ++i) begin_forces(static_cast<int>(i));
-    if (!with_ && (!springs_.empty() || !any_contacts_))
+    if (!springs_.empty() || !any_contacts_)
         (void)begin_direct(among_ghosts() ? 0 : most_at_first(), springs_.empty());
 }
 
@@ -109,12 +108,11 @@ void IslandSolver::begin_body(BodyRows& rows) {
     path.inertia = body.kind->mass.inertia;
 }
 
-// What a block's contacts need. impacts_alone: see fill_part.
-IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds, bool impacts_alone) const {
+// What a block's contacts need.
+IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds) const {
     Part part;
     for (const int m : manifolds) {
         const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
-        if (impacts_alone && !is_impact_here(manifold)) continue;
         std::size_t width = 0;
         for (const int id : {manifold.a, manifold.b})
             if (id < kFirstPlane && local(id) >= 0)
@@ -129,18 +127,11 @@ IslandSolver::Part IslandSolver::part_of(std::span<const int> manifolds, bool im
 // The contacts' rows, in the order of blocks.
 void IslandSolver::add_contacts(const Island& island) {
     blocks_.divide(crew(), places_, island.manifolds, *manifolds_, local_);
-    if (with_) shares_.divide(with_->self(), wanted_, *manifolds_, local_), find_groups();
-    each_body([this](BodyRows& rows) {
-        if (!with_ || is_used(static_cast<std::uint32_t>(&rows - rows_of_.data()))) begin_body(rows);
-    });
+    each_body([this](BodyRows& rows) { begin_body(rows); });
     sums_.assign(blocks_.slabs(), {});
     parts_.resize(blocks_.size());
     crew().each(parts_.size(), 1, [&](int, std::size_t first, std::size_t last) {
-        for (std::size_t b = first; b < last; ++b)
-            if (const bool others = with_ && !shares_.sweeps(blocks_[b]); !others || any_impacts_)
-                parts_[b] = part_of(blocks_.manifolds_of(b), others);
-            else
-                parts_[b] = {};
+        for (std::size_t b = first; b < last; ++b) parts_[b] = part_of(blocks_.manifolds_of(b));
     });
     Part all;
     for (std::size_t b = 0; b < parts_.size(); ++b) {
@@ -162,7 +153,7 @@ void IslandSolver::add_contacts(const Island& island) {
     jacobians_used_ = all.floats;
     springs_.clear(), impacts_.clear(), first_contact_.clear();
     any_told_ = direct_ = any_bounce_ = any_struck_ = any_rebound_ = any_emerging_ = false;
-    if (!with_) any_impacts_ = all.impacts;
+    any_impacts_ = all.impacts;
     any_contacts_ = !island.manifolds.empty();
     first_crossed_ = crossed_.size();
     contacts_.resize(all.contacts);
@@ -174,11 +165,7 @@ void IslandSolver::add_contacts(const Island& island) {
     for (Window& window : windows_) window.next_turn.assign(rows_of_.size(), 0);
     crew().each(parts_.size(), 1, [this](int thread, std::size_t first, std::size_t last) {
         for (std::size_t b = first; b < last; ++b)
-            if (const bool others = with_ && !shares_.sweeps(blocks_[b]); others && !parts_[b].impacts)
-                parts_[b].contacts = blocks_[b].last;
-            else
-                fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b],
-                          others);
+            fill_part(blocks_.manifolds_of(b), windows_[static_cast<std::size_t>(thread)], parts_[b]);
     });
     std::size_t next = 0;
     for (const Part& part : parts_) {  // `contacts`: their end by now
@@ -200,10 +187,9 @@ void IslandSolver::note(const Part& part) noexcept {
 // its centre would run on through what it strikes. The speed: half of its thinnest half extent in the time of its slowest mode, 1 / omega.
 void IslandSolver::stiffen(const Island& island) {
     for (const int m : island.manifolds) {
-        Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
+        const Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
         const ManifoldPoint& point = manifold.points[0];
         if (!(point.begins >= 0) || std::isinf(point.begins)) continue;
-        unpack(manifold);
         auto velocity_of = [this](int id) -> Eigen::Vector3d {
             if (id >= kFirstPlane) return Eigen::Vector3d::Zero();
             return (*bodies_)[static_cast<std::size_t>(id)].state.velocity;
@@ -221,18 +207,17 @@ void IslandSolver::stiffen(const Island& island) {
     }
 }
 
-// A block's contacts, by turns within windows; of one that another partner sweeps only impacts that concern this one.
-void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Part& part, bool impacts_alone) {
+// A block's contacts, by turns within windows.
+void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Part& part) {
     auto turns_of = [&](int id) -> int* {
         if (id >= kFirstPlane || local(id) < 0) return nullptr;
         return &window.next_turn[static_cast<std::size_t>(local(id))];
     };
     for (const int m : manifolds) {
         Manifold& manifold = (*manifolds_)[static_cast<std::size_t>(m)];
-        if (!impacts_alone || is_impact_here(manifold)) unpack(manifold);
         int* const next[] = {turns_of(manifold.a), turns_of(manifold.b)};
         for (int i = 0; i < manifold.count; ++i) {
-            if (window.contacts.size() == kWindow) flush(window, part, impacts_alone);
+            if (window.contacts.size() == kWindow) flush(window, part);
             int turn = 0;
             for (const int* of : next)
                 if (of) turn = std::max(turn, *of);
@@ -241,11 +226,11 @@ void IslandSolver::fill_part(std::span<const int> manifolds, Window& window, Par
             window.contacts.push_back({&manifold, i, turn});
         }
     }
-    flush(window, part, impacts_alone);
+    flush(window, part);
 }
 
 // Adds the window's contacts by turn, each turn's in order of ids, and begins anew.
-void IslandSolver::flush(Window& window, Part& part, bool impacts_alone) {
+void IslandSolver::flush(Window& window, Part& part) {
     std::array<int, kWindow + 1> first{};
     std::array<const Turn*, kWindow> by_turn;
     for (const Turn& t : window.contacts) ++first[static_cast<std::size_t>(t.turn) + 1];
@@ -254,7 +239,6 @@ void IslandSolver::flush(Window& window, Part& part, bool impacts_alone) {
         by_turn[static_cast<std::size_t>(first[static_cast<std::size_t>(t.turn)]++)] = &t;
     for (std::size_t i = 0; i < window.contacts.size(); ++i) {
         Manifold& manifold = *by_turn[i]->manifold;
-        if (impacts_alone && !is_impact_here(manifold)) continue;
         fill_contact(contacts_[part.contacts++], manifold,
                      manifold.points[static_cast<std::size_t>(by_turn[i]->point)], part);
     }

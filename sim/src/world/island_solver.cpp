@@ -49,11 +49,6 @@ void IslandSolver::solve(const Island& island, const ContactScene& scene, bool f
         (void)calm(energy(direct_));
     end_forces();
     keep_impulses();
-    forget_island();
-}
-
-void IslandSolver::forget_island() {
-    with_ = nullptr;
     for (const int id : island_->bodies) local_[static_cast<std::size_t>(id)] = -1;
 }
 
@@ -120,7 +115,6 @@ float IslandSolver::residual(const ContactRows& c) const {
 
 // Does what was put together.
 void IslandSolver::run() {
-    if (with_) return run_together();
     blocks_.run(
         crew(), static_cast<std::uint32_t>(phases_.size()),
         [this](std::uint32_t p) { return phases_[p].of_bodies; },
@@ -133,35 +127,29 @@ void IslandSolver::substep(bool last) {
     begin_times(substep_ * h_);
     set_forces();
     if (carried_) contacts(&Solver::see_driven);
-    if (with_) begin_borders();
-    if (substep_ > 0 && any_contacts_)
-        bodies(&Solver::turn_frames), contacts(&Solver::turn_rows, Told::skipped);
+    if (substep_ > 0 && any_contacts_) bodies(&Solver::turn_frames), contacts(&Solver::turn_rows);
     bodies(&Solver::load_velocities);
-    Told border = Told::states;
     if (any_bounce_ || any_impacts_ || !springs_.empty()) {
         run();
-        if (with_ && meet_everywhere()) border = Told::velocities;
         if (any_bounce_ || any_impacts_) strike();
         pull_springs();
     }
-    contacts(&Solver::warm_start, border);
-    contacts(&Solver::sweep<Push::soft>, Told::velocities);
+    contacts(&Solver::warm_start);
+    contacts(&Solver::sweep<Push::soft>);
     pushes_out_ = false;
     if (any_emerging_) run(), pushes_out_ = may_push_out();
-    if (pushes_out_) bodies(&Solver::keep), contacts(&Solver::sweep<Push::all>, Told::velocities);
+    if (pushes_out_) bodies(&Solver::keep), contacts(&Solver::sweep<Push::all>);
     contacts(&Solver::give_to_move);
     bodies(&Solver::move);
     if (!springs_.empty()) {
         run();
-        if (with_) meet_bodies(spring_bodies_, true);
         modes_ahead_ = true;
         pull_springs();
         modes_ahead_ = false;
     }
-    const bool follow = pushes_out_ || any_rebound_ || any_impacts_;
-    if (follow) contacts(&Solver::follow_rows, Told::places);
-    contacts(&Solver::sweep<Push::none>, follow ? Told::velocities : Told::places);
-    contacts(&Solver::sweep<Push::none>, Told::velocities);
+    if (pushes_out_ || any_rebound_ || any_impacts_) contacts(&Solver::follow_rows);
+    contacts(&Solver::sweep<Push::none>);
+    contacts(&Solver::sweep<Push::none>);
     if (any_rebound_) contacts(&Solver::note_work);
     if (any_rebound_ && last) contacts(&Solver::restitute);
     contacts(&Solver::give_the_rest);
@@ -235,13 +223,6 @@ void IslandSolver::warm_start(ContactRows& c) {
 
 // Positions move with velocities that also push emerging bodies out; the velocities themselves never see it.
 bool IslandSolver::may_push_out() {
-    if (with_) {
-        bool here = false;
-        for (std::size_t b = 0; b < blocks_.size(); ++b)
-            if (shares_.sweeps(blocks_[b]))
-                for (const ContactRows& c : contacts_in(blocks_[b])) here = here || (c.emerging && c.now < 0);
-        return any_of_all(here);
-    }
     std::atomic<bool> any = false;
     crew().each(contacts_.size(), 64, [&](int, std::size_t first, std::size_t last) {
         for (const ContactRows& c : std::span(contacts_).subspan(first, last - first))
@@ -541,10 +522,6 @@ void IslandSolver::keep_impulse(const ContactRows& c, ManifoldPoint& point) {
 
 void IslandSolver::keep_impulses() {
     each_contact([](const ContactRows& c) { keep_impulse(c, *c.point); });
-    keep_spring_impulses();
-}
-
-void IslandSolver::keep_spring_impulses() {
     for (const SpringRows& s : springs_) {
         s.point->impulse = (s.moved + s.impulse).cast<float>();
         const double force = s.point->impulse.norm() / h_;

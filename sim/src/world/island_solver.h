@@ -6,14 +6,11 @@
 #include <span>
 #include <vector>
 
-#include "bytes/byte_codec.h"
 #include "shape/lanes.h"
 #include "world/block_cholesky.h"
 #include "world/island_blocks.h"
 #include "world/island_contacts.h"
-#include "world/island_shares.h"
 #include "world/kept_vector.h"
-#include "world/partners.h"
 
 namespace sim {
 
@@ -127,29 +124,6 @@ public:
     /// bodies moves by more than kSlow of its size, contacts found again in each. Islands of bodies so small or thin that
     /// weight alone takes one further than that in a step, unless they are too fast, or go on at other workers.
     [[nodiscard]] bool may_follow(const Island& island) const;
-    // One island by several partners, island_partners.cpp.
-    /// Begins it and sweeps the part that is this partner's. false, and nothing done: it is not one that is shared out. The
-    /// same at all.
-    /// shares: how much of it each should do. changes: called before with each body whose state this partner changes.
-    [[nodiscard]] bool begin_together(const Island& island, const ContactScene& scene, Partners& with,
-                                      const std::vector<double>& shares,
-                                      const std::function<void(int id)>& changes);
-    /// Calls visit(id) for the bodies of a partner's part.
-    template <typename Visit>
-    void each_id_of(int partner, Visit visit) const {
-        shares_.each_body_of(partner, [&](std::size_t body) { visit(island_->bodies[body]); });
-    }
-    void write_part(ByteWriter& out) const;       ///< what came of this part
-    void read_part(ByteReader& in, int partner);  ///< of another's
-    /// Once all parts are there. false: the island has to be solved otherwise.
-    [[nodiscard]] bool end_together();
-    [[nodiscard]] bool calmed() const noexcept {
-        return calmed_;
-    }                         ///< by that: states are no more those of the parts
-    void give_up() noexcept;  ///< what was begun together
-    /// Writes the paths of the bodies of this part; takes those of another's.
-    void write_paths(ByteWriter& out) const;
-    void read_paths(ByteReader& in, int partner);
     /// Before a step: its number, from 0, and the forces that act within it, ascending by bodies; must stay.
     void begin_step(std::uint64_t step, const std::vector<ActiveForce>& forces) noexcept {
         first_substep_ = static_cast<double>(step) * settings_->substeps;
@@ -177,12 +151,7 @@ public:
     void add_crossed(const CrossImpulse& more);
     /// Forgets the crossed impulses of a body whose island is solved once more.
     void forget_crossed(int body);
-    /// Multiply-adds of all direct solutions since the start, about.
-    [[nodiscard]] double effort() const noexcept { return effort_; }
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept { return limited_; }
-    [[nodiscard]] std::uint64_t limited_before() const noexcept {
-        return limited_before_;
-    }                                                                                    ///< the last island
     [[nodiscard]] std::uint64_t constraints_broken() const noexcept { return broken_; }  ///< since the start
 
 private:
@@ -290,7 +259,6 @@ private:
     [[nodiscard]] double energy_of(const MovingBody& body) const;
     [[nodiscard]] double energy_of(const SpringRows& spring, bool directly) const;
     void note_springs();
-    [[nodiscard]] double with_springs(double sum, bool directly) const;
     [[nodiscard]] bool is_far_from_solved() const;
     [[nodiscard]] bool is_uneven() const;
     [[nodiscard]] bool may_gain() const;  // energy, from without
@@ -321,11 +289,11 @@ private:
         std::vector<Turn> contacts;
         std::vector<int> next_turn;  // per island body, 0 between windows
     };
-    [[nodiscard]] Part part_of(std::span<const int> manifolds, bool impacts_alone) const;
+    [[nodiscard]] Part part_of(std::span<const int> manifolds) const;
     void add_contacts(const Island& island);
     [[nodiscard]] int substep_of(const ManifoldPoint& point) const;
-    void fill_part(std::span<const int> manifolds, Window& window, Part& part, bool impacts_alone);
-    void flush(Window& window, Part& part, bool impacts_alone);
+    void fill_part(std::span<const int> manifolds, Window& window, Part& part);
+    void flush(Window& window, Part& part);
     void add_contact(Manifold& manifold, ManifoldPoint& point);
     void fill_contact(ContactRows& contact, Manifold& manifold, ManifoldPoint& point, Part& part);
     void note(const Part& part) noexcept;
@@ -347,24 +315,13 @@ private:
     [[nodiscard]] std::span<ContactRows> contacts_in(const IslandBlocks::Block& block) noexcept {
         return std::span(contacts_).subspan(block.first, block.last - block.first);
     }
-    /// What partners tell each other of the bodies on both sides of a border before they sweep it, each for itself.
-    enum class Told : std::uint8_t {
-        nothing,
-        states,      ///< and speeds; the rows are turned then
-        velocities,  ///< y
-        places,      ///< y, and where the bodies are by now
-        skipped      ///< done with the states
-    };
     /// A part of a substep: of the contacts of a block, or of the bodies of its slab. Parts are put together and then
     /// done in one hand-out, see IslandBlocks::run.
     struct Phase {
         void (IslandSolver::*act)(const IslandBlocks::Block& block);
         bool of_bodies;
-        Told told = Told::nothing;
     };
-    void contacts(void (IslandSolver::*act)(const IslandBlocks::Block&), Told told = Told::nothing) {
-        phases_.push_back({act, false, told});
-    }
+    void contacts(void (IslandSolver::*act)(const IslandBlocks::Block&)) { phases_.push_back({act, false}); }
     void bodies(void (IslandSolver::*act)(const IslandBlocks::Block&)) { phases_.push_back({act, true}); }
     void run();
     /// What a slab's bodies add to sums, in the order of sweeps.
@@ -555,60 +512,6 @@ private:
         return body.pushed ? Eigen::Vector3d(time * body.torque) : Eigen::Vector3d::Zero();
     }
 
-    // Together.
-    using Border = IslandShares::Border;
-    [[nodiscard]] bool is_plain(const Island& island, bool impacts) const;
-    void run_together();
-    [[nodiscard]] std::span<float> speeds_of(std::uint32_t body);
-    void tell(const Border& border, Told told);
-    void hear(const Border& border, Told told);
-    void begin_borders();
-    void meet_borders(Told told);
-    void find_groups();
-    [[nodiscard]] bool concerns_this(const Manifold& manifold) const;
-    [[nodiscard]] bool is_impact_here(const Manifold& manifold) const {
-        return manifold.points[0].begins >= 0 && concerns_this(manifold);
-    }
-    [[nodiscard]] bool concerns_this(const Rows& rows) const {
-        return shares_.concerns(static_cast<std::size_t>(first_body(rows)), shares_.self());
-    }
-    /// Whether a body has rows here: who sweeps others leaves it alone.
-    [[nodiscard]] bool is_used(std::uint32_t body) const;
-    /// Of two or more who compute the same, one adds up what comes from outside.
-    [[nodiscard]] bool counts_here(const Rows& rows) const {
-        return shares_.has(static_cast<std::size_t>(first_body(rows)));
-    }
-    [[nodiscard]] static int first_body(const Rows& rows) {
-        return rows.side[rows.side[0].body >= 0 ? 0 : 1].body;
-    }
-    void meet_bodies(const std::vector<std::uint32_t>& bodies, bool moved);
-    [[nodiscard]] bool meet_everywhere();
-    [[nodiscard]] bool any_of_all(bool here);
-    void write_motion(ByteWriter& out, std::uint32_t body) const;
-    void read_motion(ByteReader& in, std::uint32_t body, bool begins);
-    void read_meeting(ByteReader& in, std::uint32_t body, bool moved);
-    void turn_frame_on(BodyRows& rows);
-    [[nodiscard]] BodyPath& path_of(std::size_t body) const {
-        return (*paths_)[static_cast<std::size_t>(island_->bodies[body])];
-    }
-    [[nodiscard]] bool is_uneven(const Manifold& manifold) const;
-    void keep_spring_impulses();
-    void forget_island();
-
-    Partners* with_ = nullptr;                 // this island is solved together
-    std::vector<double> wanted_;               // shares of it
-    std::vector<std::pair<int, int>> joined_;  // bodies, by springs and impacts
-    struct Due {
-        int substep;
-        std::uint32_t body;
-    };
-    std::vector<Due> due_;  // bodies of impacts, ascending
-    std::vector<std::uint32_t> spring_bodies_, meeting_bodies_;
-    float missed_ = 0;                         // most of residual() in all parts
-    bool uneven_ = false;                      // a contact of them, as is_uneven()
-    bool calmed_ = false;                      // see calmed()
-    std::vector<Eigen::Vector3d> outside_of_;  // of each part, as outside_
-
     const WorldSettings* settings_;
     std::vector<MovingBody>* bodies_;
     std::vector<Manifold>* manifolds_;
@@ -638,18 +541,17 @@ private:
     KeptVector<BodyRows> rows_of_;  // per island body
     std::vector<int> local_;        // world body -> island body or -1
     IslandBlocks blocks_;
-    IslandShares shares_{blocks_};            // together
     std::vector<IslandBlocks::Body> places_;  // of the bodies, to divide them
     std::vector<Sums> sums_;                  // of each slab
     std::vector<Part> parts_;                 // of each block
     std::vector<Window> windows_;             // of each thread
     std::vector<Phase> phases_;               // that run() will do
     std::vector<int> next_of_;                // per island body
-    KeptVector<ContactRows> contacts_;        // together those of this part, and impacts that concern it
+    KeptVector<ContactRows> contacts_;
     std::vector<SpringRows> springs_;
     bool springs_soft_ = true;          // as the step begins
     bool modes_ahead_ = false;          // springs' ends are where the substep takes them, with their modes
-    std::vector<std::size_t> impacts_;  // contacts, of fast pairs; together those that concern this partner
+    std::vector<std::size_t> impacts_;  // contacts, of fast pairs
     bool any_contacts_ = false, any_impacts_ = false;       // in the island
     std::vector<Hit> hits_;                                 // of the substep, by time
     std::vector<int> hit_bodies_;                           // of the impact that is being solved
@@ -684,7 +586,6 @@ private:
     double energy_before_ = 0, fastest_ = 0, smallest_ = 0, scale_ = 0;  // see sum_start
     struct Measure {
         double energy, scale, speed, size;
-        double after = 0;  // energy at the end, together
     };
     [[nodiscard]] Measure measure(const MovingBody& body) const;
     [[nodiscard]] static double size_of(const MovingBody& body) { return 2 * body.kind->half_box.minCoeff(); }
@@ -694,8 +595,6 @@ private:
     std::uint64_t limited_before_ = 0;
     std::vector<Before> before_;  // per world body, the last island's when the step began
     BlockCholesky factor_;
-    double factor_cost_ = 0,
-           effort_ = 0;      // multiply-adds: of a factorisation; of direct solutions since the start
     bool factored_ = false;  // rows and springs have not changed since
     std::vector<int> sizes_;
     std::vector<DirectContact> direct_contacts_;

@@ -30,9 +30,6 @@ struct Manifold {
     float friction = 0, restitution = 0;
     float impulse_reach = 0;  ///< how far from a point its last impulse may have been, see take_impulses [m]
     bool emerging = false;    ///< came deep into each other, and still overlap
-    /// Where a partner's messages have the points, of which only `begins` of the first is here, and the impulses that came of
-    /// them; see unpack (step_records.h). nullptr: they are here.
-    const std::uint8_t *packed_points = nullptr, *packed_impulses = nullptr;
     std::array<ManifoldPoint, kManifoldPoints> points;
     [[nodiscard]] std::uint64_t key() const noexcept {  ///< orders pairs by (a, b)
         return static_cast<std::uint64_t>(a) << 32 | static_cast<std::uint32_t>(b);

@@ -20,14 +20,10 @@ Lanes larger(Lanes a, Lanes b) {
 
 }  // namespace
 
-void PosedBody::place(const Eigen::Vector3d& at, const Eigen::Quaterniond& orientation) {
-    position = at;
-    rotation = orientation.toRotationMatrix();
-}
-
 void PosedBody::set(const Eigen::Vector3d& at, const Eigen::Quaterniond& orientation,
                     const Eigen::VectorXd& q) {
-    place(at, orientation);
+    position = at;
+    rotation = orientation.toRotationMatrix();
     half_box = kind->half_box.cast<float>();
     radius = static_cast<float>(kind->surface.bounding_radius());
     sample_reach = 0;

@@ -33,8 +33,6 @@ struct PosedBody {
     /// Deformed place of a rest point, body frame.
     [[nodiscard]] Eigen::Vector3d deformed(const Eigen::Vector3d& rest) const noexcept;
 
-    /// Where it is; its shape stays as it was.
-    void place(const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation);
     /// q: the modal coordinates. Costs about modes x samples / 3 multiply-adds of eight.
     void set(const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation,
              const Eigen::VectorXd& q);

@@ -127,7 +127,7 @@ bool World::Implementation::any_broken(Concerned concerned) {
 // After a step: bodies that it broke, before any reader sees them.
 void World::Implementation::quarantine_results() {
     // Asleep: not of an island that was solved.
-    const bool any = !results_checked && any_broken([](const MovingBody& body) { return body.moves(); });
+    const bool any = any_broken([](const MovingBody& body) { return body.moves(); });
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_own(islands[i])) continue;
         for (const int id : islands[i].bodies) {
@@ -297,10 +297,7 @@ void World::Implementation::count_work() {
         body.work = body.moves() && !body.asleep ? 1 : 0;
     }
     cross_contacts = counts.contacts = 0;
-    auto own = [this](int id) {
-        const auto at = static_cast<std::size_t>(id);
-        return id < kFirstPlane && (owned_by_this.empty() ? bodies[at].own : owned_by_this[at] != 0);
-    };
+    auto own = [this](int id) { return id < kFirstPlane && bodies[static_cast<std::size_t>(id)].own; };
     for (const Manifold& m : contacts.manifolds()) {
         if (!own(m.a) && !own(m.b)) continue;
         counts.contacts += m.count;
@@ -333,7 +330,7 @@ void World::Implementation::set_threads(std::unique_ptr<Crew> crew) {
 
 void World::Implementation::step() {
     const FlushDenormals flush;
-    solving = results_checked = false;
+    solving = false;
     solver().cross(sharing == Sharing::pairs);
     outside_before = outside;
     ++counts.steps;
@@ -349,32 +346,22 @@ void World::Implementation::step() {
         end_motions();
         return dismiss_ghosts();
     }
-    if (with) find_near();
     crew().each(here.size(), 16, [this](int, std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i) {
             MovingBody& body = bodies[static_cast<std::size_t>(here[i])];
             body.was_given = false;
             if (!body.moves() || (body.asleep && !body.unposed)) continue;
-            if (!with || near[static_cast<std::size_t>(here[i])] != 0) {
-                pose(body);
-            } else {
-                body.posed.place(body.state.position, body.state.orientation);
-                body.unposed = true;
-            }
+            pose(body);
         }
     });
     const auto [fallbacks_before, impacts_before] = std::pair(contacts.fallbacks(), contacts.impacts());
-    effort.resize(constraints.size()), effort_told = effort;
-    contacts.find(
-        contact_scene(crew()), with, [this](ByteWriter& out) { write_efforts(out); },
-        [this](ByteReader& in, int partner) { read_efforts(in, partner); });
+    contacts.find(contact_scene(crew()));
     find_islands();
     held_before.resize(constraints.size());
     for (std::size_t c = 0; c < constraints.size(); ++c) held_before[c] = constraints[c].holds;
     const auto [limited_before, broken_before] =
         std::pair(counts.deformations_limited, counts.constraints_broken);
     solve_islands();
-    with = nullptr;  // what is left each does for itself
     tell_broken(broken_before);
     tell_limited(limited_before);
     put_to_sleep();
@@ -424,10 +411,6 @@ World& World::operator=(World&&) noexcept = default;
 
 void World::step() {
     implementation_->step();
-}
-
-void World::step_together(Partners& with) {
-    implementation_->step_together(with);
 }
 
 int World::add_body(const WorldBody& body) {

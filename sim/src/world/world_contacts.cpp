@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "world/step_records.h"
 
 namespace sim {
 namespace {
@@ -12,8 +11,7 @@ namespace {
 // several samples, whose normals differ by more.
 constexpr double kNormalTurn = 0.004, kBentNormalTurn = 0.05;  // [rad]
 
-constexpr std::uint32_t kMostPairs = 1 << 22;  // of one partner
-constexpr std::size_t kLeastPart = 16;         // bodies whose contacts a thread finds at once
+constexpr std::size_t kLeastPart = 16;  // bodies whose contacts a thread finds at once
 
 double smallest_half(const MovingBody& body) {
     return sim::smallest_half(body.posed);
@@ -92,18 +90,15 @@ void wake_group(std::vector<MovingBody>& bodies, int body) {
     }
 }
 
-void WorldContacts::find(const ContactScene& scene, Partners* with, const WriteAside& write_aside,
-                         const ReadAside& read_aside) {
+void WorldContacts::find(const ContactScene& scene) {
     std::swap(before_, manifolds_);
-    std::swap(kept_before_, kept_);
-    kept_.clear();
     reach_.resize(scene.bodies.size());
     paths_.resize(scene.bodies.size());
     first_.resize(scene.bodies.size());
     while (narrow_.size() < static_cast<std::size_t>(scene.crew.size()))
         narrow_.push_back(std::make_unique<NarrowPhase>());
     known_.clear();
-    while (find_once(scene, with, write_aside, read_aside)) {
+    while (find_once(scene)) {
     }
 }
 
@@ -136,7 +131,7 @@ void WorldContacts::set_reach(const ContactScene& scene, int id) {
 }
 
 void WorldContacts::set_box(const ContactScene& scene, std::size_t i) {
-    const int id = posed_[i];
+    const int id = scene.here[i];
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
     const Reach& reach = reach_[static_cast<std::size_t>(id)];
     const Eigen::Vector3d half =
@@ -146,37 +141,27 @@ void WorldContacts::set_box(const ContactScene& scene, std::size_t i) {
                          body.travels || (body.moves() && !body.asleep)};
 }
 
-bool WorldContacts::find_once(const ContactScene& scene, Partners* with, const WriteAside& write_aside,
-                              const ReadAside& read_aside) {
+bool WorldContacts::find_once(const ContactScene& scene) {
     meetings_.clear();
     followed_.assign(scene.bodies.size(), kNotFollowed);
     watched_.assign(scene.bodies.size(), 0);
     const std::size_t count = scene.here.size();
-    posed_.clear();
-    for (const int id : scene.here)
-        if (const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
-            !body.moves() || !body.unposed)
-            posed_.push_back(id);
-    broad_.boxes().resize(posed_.size());
+    broad_.boxes().resize(count);
     scene.crew.each(count, 64, [&](int, std::size_t first, std::size_t last) {
-        for (std::size_t i = first; i < last; ++i) set_reach(scene, scene.here[i]);
-    });
-    scene.crew.each(posed_.size(), 64, [&](int, std::size_t first, std::size_t last) {
-        for (std::size_t i = first; i < last; ++i) set_box(scene, i);
+        for (std::size_t i = first; i < last; ++i) set_reach(scene, scene.here[i]), set_box(scene, i);
     });
     const auto& pairs = broad_.find(scene.crew);
     const std::size_t most = scene.crew.size() == 1 ? 1 : 16 * static_cast<std::size_t>(scene.crew.size());
-    const std::size_t parts = with ? 1 : std::clamp(count / kLeastPart, std::size_t{1}, most);
+    const std::size_t parts = std::clamp(count / kLeastPart, std::size_t{1}, most);
     found_.resize(std::max(parts, found_.size()));
     scene.crew.each(parts, 1, [&](int thread, std::size_t first, std::size_t last) {
         for (std::size_t p = first; p < last; ++p) {
             found_[p].first = p * count / parts, found_[p].last = (p + 1) * count / parts;
             found_[p].narrow = narrow_[static_cast<std::size_t>(thread)].get();
-            find(scene, pairs, found_[p], with);
+            find(scene, pairs, found_[p]);
         }
     });
-    if (with) share(scene, *with, write_aside, read_aside);
-    gather(scene, parts, with != nullptr);
+    gather(scene, parts);
     bool woke = false;
     for (std::size_t p = 0; p < parts; ++p)
         for (const int id : found_[p].woken) wake_group(scene.bodies, id), woke = true;
@@ -185,7 +170,7 @@ bool WorldContacts::find_once(const ContactScene& scene, Partners* with, const W
 }
 
 void WorldContacts::find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs,
-                         Found& found, const Partners* with) {
+                         Found& found) {
     found.manifolds.clear(), found.meetings.clear(), found.woken.clear();
     found.pairs = 0;
     if (found.first == found.last) return;
@@ -195,138 +180,14 @@ void WorldContacts::find(const ContactScene& scene, const std::vector<std::pair<
     auto pair = std::ranges::lower_bound(pairs, first, {}, &std::pair<int, int>::first);
     for (std::size_t k = found.first; k < found.last; ++k) {
         const int i = scene.here[k];
-        const bool moves = scene.bodies[static_cast<std::size_t>(i)].moves();
         for (; pair != pairs.end() && pair->first == i; ++pair)
-            if ((!with || with->of(moves ? i : pair->second) == with->self()) && scene.may_meet(*pair))
-                meet_pair(scene, i, pair->second, found);
-        if (!with || with->of(i) == with->self()) meet_planes(scene, i, found);
+            if (scene.may_meet(*pair)) meet_pair(scene, i, pair->second, found);
+        meet_planes(scene, i, found);
     }
-}
-
-// What all partners found, in the order of keys, as if one thread had.
-void WorldContacts::share(const ContactScene& scene, Partners& with, const WriteAside& write_aside,
-                          const ReadAside& read_aside) {
-    Found& found = found_.front();
-    ByteWriter out;
-    out.bytes().reserve(160 * found.manifolds.size() + 64);
-    out.count(found.manifolds.size());
-    for (const Manifold& m : found.manifolds) write(out, m);
-    // What wakes bodies is found again; what is late among own meetings is among all.
-    note_first(scene, found.meetings);
-    for (Meeting& m : found.meetings)
-        if (!found.woken.empty() || is_late(scene, m)) m.told = kNoImpact;
-    told_impacts_.resize(found.meetings.size());
-    for (Manifold& impact : told_impacts_) impact.count = 0;
-    find_impacts(scene, found.meetings, {told_impacts_.data(), told_impacts_.size()});
-    out.count(found.meetings.size());
-    for (std::size_t i = 0; i < found.meetings.size(); ++i) {
-        Meeting& m = found.meetings[i];
-        m.told = told_impacts_[i].count > 0 ? static_cast<int>(i) : kNoImpact;
-        out.number(m.a), out.number(m.b), out.number(m.time);
-        out.number<std::uint8_t>(m.told != kNoImpact);
-        if (m.told != kNoImpact) write(out, told_impacts_[i]);
-    }
-    out.count(found.woken.size());
-    for (const int id : found.woken) out.number(id);
-    const auto watched = static_cast<std::size_t>(std::ranges::count(watched_, 1));
-    out.count(watched);
-    for (std::size_t i = 0; i < watched_.size() && watched > 0; ++i)
-        if (watched_[i] != 0) out.number(static_cast<std::uint32_t>(i));
-    out.number(found.pairs);
-    if (write_aside) write_aside(out);
-    with.tell_all(std::move(out.bytes()));
-    told_.clear(), runs_.clear();
-    for (std::size_t i = 0; i < found.manifolds.size(); ++i)
-        told_.push_back({found.manifolds[i].key(), {}, i});
-    runs_.push_back(told_.size());
-    for (int p = 0; p < with.count(); ++p) {
-        if (p == with.self()) continue;
-        const std::span<const std::uint8_t> heard = keep(with.hear(p));
-        ByteReader in(heard);
-        hear(scene, in, heard);
-        if (read_aside) read_aside(in, p);
-        in.expect_end();
-    }
-    merge_told();
-    all_found_.resize(told_.size());
-    for (std::size_t i = 0; i < told_.size(); ++i) {
-        if (told_[i].bytes.empty()) {
-            all_found_[i] = found.manifolds[told_[i].own];
-        } else {
-            ByteReader in(told_[i].bytes);
-            read(in, all_found_[i], scene.bodies, scene.planes.size());
-        }
-    }
-    const auto pair_of = [](const Meeting& m) { return std::pair(m.a, m.b); };
-    std::ranges::sort(found.meetings, {}, pair_of);
-    if (std::ranges::adjacent_find(found.meetings, {}, pair_of) != found.meetings.end())
-        throw DecodeError("a meeting that two found");
-}
-
-void WorldContacts::hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes) {
-    Found& found = found_.front();
-    const std::uint32_t count = static_cast<std::uint32_t>(scene.bodies.size());
-    auto body = [&] {
-        const auto id = in.number<std::uint32_t>();
-        if (id >= count) throw DecodeError("body " + std::to_string(id) + " of " + std::to_string(count));
-        return static_cast<int>(id);
-    };
-    for (std::uint32_t n = in.count(22); n > 0; --n) {
-        const std::span<const std::uint8_t> from = bytes.last(in.left());
-        const std::uint64_t key = skip_manifold(in);
-        told_.push_back({key, from.first(from.size() - in.left()), 0});
-        if (told_.size() > runs_.back() + 1 && key <= told_[told_.size() - 2].key)
-            throw DecodeError("contacts that do not ascend");
-    }
-    runs_.push_back(told_.size());
-    for (std::uint32_t n = in.count(17); n > 0; --n) {
-        const int a = body(), b = body();
-        const bool any = scene.bodies[static_cast<std::size_t>(a)].moves() ||
-                         scene.bodies[static_cast<std::size_t>(b)].moves();
-        if (a >= b || !any) throw DecodeError("a meeting of what does not meet");
-        const double time = read_finite(in);
-        if (!(time >= 0 && time <= scene.settings.dt)) throw DecodeError("a meeting that is not in the step");
-        found.meetings.push_back({a, b, time, false, kNoImpact});
-        if (!in.flag()) continue;
-        found.meetings.back().told = static_cast<int>(told_impacts_.size());
-        Manifold& impact = told_impacts_.extend();
-        read(in, impact, scene.bodies, scene.planes.size());
-        unpack(impact);
-        const auto points = std::span(impact.points).first(static_cast<std::size_t>(impact.count));
-        if (impact.a != a || impact.b != b || !std::ranges::all_of(points, [&](const ManifoldPoint& p) {
-                return p.begins == static_cast<float>(time);
-            }))
-            throw DecodeError("an impact that is not of its meeting");
-    }
-    for (std::uint32_t n = in.count(4); n > 0; --n) found.woken.push_back(body());
-    for (std::uint32_t n = in.count(4); n > 0; --n) watched_[static_cast<std::size_t>(body())] = 1;
-    const auto pairs = in.number<std::uint32_t>();
-    if (pairs > kMostPairs) throw DecodeError(std::to_string(pairs) + " pairs");
-    found.pairs += static_cast<int>(pairs);
-}
-
-// Each run ascends: neighbours are merged until one is left.
-void WorldContacts::merge_told() {
-    const auto at = [this](std::size_t place) { return told_.begin() + static_cast<std::ptrdiff_t>(place); };
-    while (runs_.size() > 1) {
-        std::size_t first = 0, kept = 0;
-        for (std::size_t r = 0; r < runs_.size(); r += 2) {
-            const std::size_t middle = runs_[r], last = runs_[std::min(r + 1, runs_.size() - 1)];
-            std::ranges::inplace_merge(at(first), at(middle), at(last), {}, &Told::key);
-            runs_[kept++] = first = last;
-        }
-        runs_.resize(kept);
-    }
-    if (std::ranges::adjacent_find(told_, {}, &Told::key) != told_.end())
-        throw DecodeError("a contact that two found");
-}
-
-void WorldContacts::unpack_all() {
-    for (Manifold& m : manifolds_) unpack(m);
 }
 
 // What all threads found, in the order of keys.
-void WorldContacts::gather(const ContactScene& scene, std::size_t parts, bool shared) {
+void WorldContacts::gather(const ContactScene& scene, std::size_t parts) {
     pairs_ = 0;
     std::size_t sum = 0;
     for (std::size_t p = 0; p < parts; ++p) {
@@ -334,7 +195,6 @@ void WorldContacts::gather(const ContactScene& scene, std::size_t parts, bool sh
         meetings_.insert(meetings_.end(), found_[p].meetings.begin(), found_[p].meetings.end());
         found_[p].next_before = std::exchange(sum, sum + found_[p].manifolds.size());  // where they go
     }
-    if (shared) return std::swap(manifolds_, all_found_);
     if (parts == 1) return std::swap(manifolds_, found_[0].manifolds);
     manifolds_.resize(sum);
     scene.crew.each(parts, 1, [this](int, std::size_t first, std::size_t last) {
@@ -369,7 +229,6 @@ const Manifold* WorldContacts::last(std::uint64_t key, Found& found) {
     std::size_t& next = found.next_before;
     while (next < before_.size() && before_[next].key() < key) ++next;
     if (next >= before_.size() || before_[next].key() != key) return nullptr;
-    unpack(before_[next]);
     return &before_[next];
 }
 

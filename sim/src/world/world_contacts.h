@@ -1,16 +1,13 @@
 #pragma once
 #include <array>
-#include <functional>
 #include <memory>
 #include <span>
 
-#include "bytes/byte_codec.h"
 #include "world/body_path.h"
 #include "world/broad_phase.h"
 #include "world/crew.h"
 #include "world/kept_vector.h"
 #include "world/narrow_phase.h"
-#include "world/partners.h"
 #include "world/time_of_impact.h"
 
 namespace sim {
@@ -52,39 +49,17 @@ struct ContactScene {
 /// already meets again where it is kInside deep in each other, a little deeper every time.
 class WorldContacts {
 public:
-    /// What partners tell each other besides.
-    using WriteAside = std::function<void(ByteWriter&)>;
-    using ReadAside = std::function<void(ByteReader&, int partner)>;
-    /// with: partners, each of whom finds those of its bodies, with the impacts that meetings lead to, and tells the others.
-    void find(const ContactScene& scene, Partners* with = nullptr, const WriteAside& write = {},
-              const ReadAside& read = {});
+    void find(const ContactScene& scene);
 
     /// After a solve (`solved`: the bodies that went through it; `started`: the states of all that move, before): contacts for what the paths really taken lead to. Adds at most one impact a body and
     /// lists it; the worlds' islands then are solved again. Empty: nothing unforeseen.
-    enum : int { kToBeFound = -1, kNoImpact = -2 };
     struct Meeting {
         int a, b;
         double time;    ///< since the step's start [s]
         bool touching;  ///< had a contact already, and still went on inside
-        /// Place among told_impacts_, as the partner found it whose the pair is; or one of these:
-        int told = kToBeFound;
     };
     const std::vector<Meeting>& unforeseen(const ContactScene& scene, const std::vector<std::uint8_t>& solved,
                                            const std::vector<WorldBodyState>& started);
-    /// Whether unforeseen() looks at any path: of all bodies near.
-    [[nodiscard]] bool any_left_path(const ContactScene& scene,
-                                     const std::vector<std::uint8_t>& solved) const;
-    /// After find(), whether it came to an end or not: the contacts before it.
-    void go_back() noexcept {
-        std::swap(before_, manifolds_);
-        std::swap(kept_before_, kept_);
-    }
-    /// Keeps what a partner told until the end of the next step, as contacts of this one may have their points in it. Returns it.
-    std::span<const std::uint8_t> keep(Partners::Bytes&& heard) {
-        return kept_.emplace_back(std::move(heard));
-    }
-    /// Takes all points out of what partners told.
-    void unpack_all();
     /// Of several impacts of a pair within the step only the last is one of its past in the next.
     void keep_last();
     /// The pair's manifold in this step, if it has one; the first of several.
@@ -126,14 +101,10 @@ private:
         std::vector<int> woken;
         int pairs = 0;
     };
-    bool find_once(const ContactScene& scene, Partners* with, const WriteAside& write, const ReadAside& read);
+    bool find_once(const ContactScene& scene);
     void set_box(const ContactScene& scene, std::size_t i);
-    void find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs, Found& found,
-              const Partners* with);
-    void share(const ContactScene& scene, Partners& with, const WriteAside& write, const ReadAside& read);
-    void hear(const ContactScene& scene, ByteReader& in, std::span<const std::uint8_t> bytes);
-    void merge_told();
-    void gather(const ContactScene& scene, std::size_t parts, bool shared);
+    void find(const ContactScene& scene, const std::vector<std::pair<int, int>>& pairs, Found& found);
+    void gather(const ContactScene& scene, std::size_t parts);
     void meet_pair(const ContactScene& scene, int i, int j, Found& found);
     [[nodiscard]] bool pass_by(const ContactScene& scene, int i, int j) const;
     void meet_near(const ContactScene& scene, int i, int j, double margin, const Manifold* before,
@@ -159,26 +130,18 @@ private:
     void find_impact(const ContactScene& scene, const Meeting& meeting, std::size_t thread,
                      Manifold& manifold);
     [[nodiscard]] bool left_path(const ContactScene& scene, int i) const;
+    /// Whether unforeseen() looks at any path.
+    [[nodiscard]] bool any_left_path(const ContactScene& scene,
+                                     const std::vector<std::uint8_t>& solved) const;
     void meet_unforeseen(const ContactScene& scene, int i, int j);
 
     BroadPhase broad_;
     std::vector<std::unique_ptr<NarrowPhase>> narrow_;  // of each thread
     std::vector<Found> found_;
-    std::vector<int> posed_;                           // of scene.here, those whose shape is known
-    std::vector<Reach> reach_;                         // of each body
-    std::vector<Manifold> manifolds_, before_;         // by ascending keys
-    KeptVector<Manifold> added_;                       // to them
-    std::vector<Partners::Bytes> kept_, kept_before_;  // that have points of manifolds_, of before_
-    struct Told {
-        std::uint64_t key;
-        std::span<const std::uint8_t> bytes;  // of a partner's message
-        std::size_t own;                      // place among those found here, where there are none
-    };
-    std::vector<Told> told_;         // manifolds, in runs of one partner each, then by ascending keys
-    std::vector<std::size_t> runs_;  // where each ends
-    std::vector<Manifold> all_found_;
-    KeptVector<Manifold> told_impacts_;  // of meetings, own ones and those of partners
-    std::vector<BodyPath> paths_;        // of each body
+    std::vector<Reach> reach_;                  // of each body
+    std::vector<Manifold> manifolds_, before_;  // by ascending keys
+    KeptVector<Manifold> added_;                // to them
+    std::vector<BodyPath> paths_;               // of each body
     enum : std::uint8_t { kNotFollowed, kBeingFollowed, kFollowed };
     std::vector<std::uint8_t> followed_;  // paths_ holds the free motion of this step; by any thread
     std::vector<std::uint8_t> watched_;   // has a contact that turns on: see unforeseen; by any thread

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "world/step_records.h"
 #include "world/world_contacts.h"
 
 // Fast pairs: impacts on paths of free motion, and on those really taken.
@@ -39,7 +38,6 @@ const Manifold* WorldContacts::find_last(std::uint64_t key) {
     const auto at = std::lower_bound(before_.begin(), before_.end(), key,
                                      [](const Manifold& m, std::uint64_t k) { return m.key() < k; });
     if (at == before_.end() || at->key() != key) return nullptr;
-    unpack(*at);
     return &*at;
 }
 
@@ -57,7 +55,6 @@ int WorldContacts::impacts_of(int i, int j) const {
 }
 
 void WorldContacts::rewarm(Manifold& manifold) {
-    unpack(manifold);
     for (ManifoldPoint& point : manifold.points) point.normal_impulse = 0, point.friction_impulse.setZero();
     const Manifold* before = find_last(manifold.key());
     if (before && manifold.points[0].begins < 0) take_impulses(*before, manifold.impulse_reach, manifold);
@@ -107,19 +104,17 @@ bool WorldContacts::is_late(const ContactScene& scene, const Meeting& m) const {
 void WorldContacts::accept_impacts(const ContactScene& scene) {
     const auto sorted = static_cast<std::ptrdiff_t>(manifolds_.size());
     note_first(scene, meetings_);
-    std::erase_if(meetings_, [&](const Meeting& m) { return m.told == kNoImpact || is_late(scene, m); });
+    std::erase_if(meetings_, [&](const Meeting& m) { return is_late(scene, m); });
     added_.resize(meetings_.size());
     find_impacts(scene, meetings_, {added_.data(), added_.size()});
     std::size_t found = 0;
     for (std::size_t i = 0; i < meetings_.size(); ++i) {
         const Meeting& m = meetings_[i];
-        const Manifold& impact =
-            m.told == kToBeFound ? added_[i] : told_impacts_[static_cast<std::size_t>(m.told)];
-        if (impact.count == 0) continue;
+        if (added_[i].count == 0) continue;
         watch_turning(m.a, m.b,
                       kSlow * size_of(scene.bodies[static_cast<std::size_t>(m.a)],
                                       scene.bodies[static_cast<std::size_t>(m.b)]));
-        added_[found] = impact, meetings_[found++] = m;
+        added_[found] = added_[i], meetings_[found++] = m;
     }
     meetings_.resize(found), added_.resize(found);
     impacts_ += found;
@@ -134,14 +129,12 @@ void WorldContacts::accept_impacts(const ContactScene& scene) {
     }
 }
 
-// Of those that are to be found.
 void WorldContacts::find_impacts(const ContactScene& scene, std::span<const Meeting> meetings,
                                  std::span<Manifold> impacts) {
     at_.resize(std::max(at_.size(), static_cast<std::size_t>(scene.crew.size())));
     scene.crew.each(meetings.size(), 4, [&](int thread, std::size_t first, std::size_t last) {
         for (std::size_t i = first; i < last; ++i)
-            if (meetings[i].told == kToBeFound)
-                find_impact(scene, meetings[i], static_cast<std::size_t>(thread), impacts[i]);
+            find_impact(scene, meetings[i], static_cast<std::size_t>(thread), impacts[i]);
     });
 }
 

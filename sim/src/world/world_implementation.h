@@ -29,8 +29,7 @@ struct World::Implementation {
     std::vector<std::unique_ptr<IslandSolver>> solvers;  // one a thread
     std::unique_ptr<Crew> all = std::make_unique<Crew>();
     Crew alone;
-    /// Who shares the work of a step: of one by several partners one thread of each.
-    [[nodiscard]] Crew& crew() noexcept { return with ? alone : *all; }
+    [[nodiscard]] Crew& crew() noexcept { return *all; }  ///< who shares the work of a step
     [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
     void set_threads(std::unique_ptr<Crew> crew);
     std::vector<Island> islands;
@@ -49,7 +48,6 @@ struct World::Implementation {
     std::vector<Outcome> outcomes;
     std::vector<WorldBodyState> started;        // of bodies that are solved, when the step began
     std::vector<std::uint8_t> at_limit_before;  // at_limit of bodies, then
-    std::vector<std::uint8_t> noted;            // of each body: both are known
     std::vector<SpringRecord> springs_before;   // then
     std::vector<std::uint8_t> solved,
         again;  // of each body: its island went through the solver, and has to once more
@@ -62,50 +60,9 @@ struct World::Implementation {
 
     std::vector<int> here;  // bodies that take part in the step, ascending
 
-    // Together, world_together.cpp.
     using Solve = std::function<void(const Island&, IslandSolver&, const ContactScene&)>;
-    Partners* with = nullptr;                 ///< of this step
-    std::vector<std::uint8_t> owned_by_this;  ///< own of each body, while such a step counts them all
-    struct Sleep {
-        bool asleep;
-        int still_steps, group;
-    };
-    std::vector<Sleep> sleep_before;  ///< of each body, when the step began
-    bool solving = false;             ///< the step has come so far
-    bool results_checked = false;     ///< as they came: no body is broken
-    bool all_whole = false;           ///< no own body is broken: nothing has changed them since that was seen
-    std::vector<std::uint8_t> near;   ///< of each body: this partner's may meet it
-    void find_near();                 ///< fills `near`
-    void pose_the_rest();             ///< as the step began
-    struct Divided {
-        const Island* island;
-        IslandSolver* part;
-    };
-    std::vector<Divided> divided;  ///< islands of which all sweep a part
-    std::vector<double> effort,    ///< of each constraint: what solving its island took last time, as cost_of
-        effort_told;               ///< as its body's owner knows it
-    std::vector<double> spare;     ///< of each partner: what it should still do, in the step
-    std::vector<int> solved_by;    ///< of an island's first body: which partner solves it
-    std::vector<std::pair<double, const Island*>> dear;  ///< small islands that take long
-    std::vector<std::vector<const Island*>> solves;      ///< each partner which of the small islands
-    void write_efforts(ByteWriter& out) const;
-    void read_efforts(ByteReader& in, int partner);
-    [[nodiscard]] double cost_of(const Island& island) const;
-    void plan_islands();
-    [[nodiscard]] int solver_of(const Island& island) const {
-        return solved_by[static_cast<std::size_t>(island.bodies.front())];
-    }
-    IslandSolver& part_solver(std::size_t part);
-    bool end_divided(const Divided& d, const Solve& solve, const ContactScene& scene);
-    void step_together(Partners& with);
-    void restore_own() noexcept;
-    void go_back(const WorldCounts& counts_before);
-    void solve_together(const Solve& solve, bool first);
-    [[nodiscard]] bool is_by_one(const Island& island) const;
-    void write_result(ByteWriter& out, const Island& island) const;
-    void read_result(ByteReader& in, const Island& island);
-    void share_paths();
-
+    bool solving = false;  ///< the step has come so far
+    bool all_whole = false;  ///< no own body is broken: nothing has changed them since that was seen
     // Sharing.
     Sharing sharing = Sharing::alone;
     std::vector<int> owned;    // pairs: own and fixed bodies, ascending
@@ -147,12 +104,11 @@ struct World::Implementation {
     void dismiss_ghosts();  ///< at the end of a step
     void find_islands();    ///< of contacts and constraints
     void solve_islands();   ///< in order of ids, again where something unforeseen meets
-    void start_solving();   ///< notes what solve_again goes back to; with partners each body once it changes
-    void note_started(int body);
-    void note_before_reading(int body);  ///< the same; leaves anything in its state
+    void start_solving();   ///< notes what solve_again goes back to
     void solve_island(const Island& island, bool follow, IslandSolver& by, const ContactScene& scene);
-    /// Calls solve(island, solver, scene) for those in `to_solve`. first: of the step's rounds.
-    void share_islands(const Solve& solve, bool first);
+    [[nodiscard]] bool is_by_one(const Island& island) const;
+    /// Calls solve(island, solver, scene) for those in `to_solve`.
+    void share_islands(const Solve& solve);
     void begin_again(const Island& island);
     std::vector<const Island*> to_solve, small;  // small: of them, for one thread each
     void note_found();                           ///< contacts, by the islands that have just been solved

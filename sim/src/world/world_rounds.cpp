@@ -1,6 +1,5 @@
 #include <algorithm>
 
-#include "world/step_records.h"
 #include "world/world_implementation.h"
 
 // Solves a step's islands, and those again in which bodies meet what nobody foresaw.
@@ -8,8 +7,7 @@
 namespace sim {
 namespace {
 
-constexpr double kEffortInWork = 2500;  // multiply-adds that take as long as a body that touches nothing
-constexpr int kRounds = 24;             // then what still meets is held apart
+constexpr int kRounds = 24;  // then what still meets is held apart
 
 struct Kick {
     Eigen::Vector3d impulse, place;
@@ -56,32 +54,19 @@ void World::Implementation::start_solving() {
     outcomes.resize(bodies.size());
     solved.assign(bodies.size(), 0);
     again.assign(bodies.size(), 0);
-    noted.assign(bodies.size(), 0);
     // Of others' bodies alone, too: own ones may meet them unforeseen.
-    for (std::size_t i = 0; i < islands_used && !with; ++i) {
+    for (std::size_t i = 0; i < islands_used; ++i) {
         const std::vector<int>& of_island = islands[i].bodies;
         crew().each(of_island.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
-            for (std::size_t k = first; k < end; ++k) note_started(of_island[k]);
+            for (std::size_t k = first; k < end; ++k) {
+                const auto at = static_cast<std::size_t>(of_island[k]);
+                started[at] = bodies[at].state;
+                at_limit_before[at] = bodies[at].at_limit;
+            }
         });
     }
     springs_before.clear();
     for (std::size_t c = 0; c < constraints.size(); ++c) springs_before.push_back(spring_record(c));
-}
-
-void World::Implementation::note_started(int id) {
-    const auto at = static_cast<std::size_t>(id);
-    if (std::exchange(noted[at], 1) != 0) return;
-    started[at] = bodies[at].state;
-    at_limit_before[at] = bodies[at].at_limit;
-}
-
-void World::Implementation::note_before_reading(int id) {
-    const auto at = static_cast<std::size_t>(id);
-    MovingBody& body = bodies[at];
-    if (started[at].q.size() != body.state.q.size()) return note_started(id);  // the first time
-    if (std::exchange(noted[at], 1) != 0) return;
-    std::swap(started[at], body.state);
-    at_limit_before[at] = body.at_limit;
 }
 
 void World::Implementation::move_alone(int id) {
@@ -101,15 +86,11 @@ void World::Implementation::solve_island(const Island& island, bool follow, Isla
     if (island.manifolds.empty() && island.constraints.empty() && !is_forced(island.bodies.front()))
         return move_alone(island.bodies.front());
     const std::uint64_t limits = by.deformations_limited(), breaks = by.constraints_broken();
-    const double effort_before = by.effort();
     by.solve(island, scene, follow && by.may_follow(island));
     if (const std::vector<Manifold>* found = by.found()) outcome.found = true, outcome.manifolds = *found;
     outcome.limited = by.deformations_limited() - limits;
     outcome.broken = by.constraints_broken() - breaks;
     outcome.outside = by.take_outside_impulse();
-    for (const int c : island.constraints)
-        effort[static_cast<std::size_t>(c)] =
-            (by.effort() - effort_before) / kEffortInWork / static_cast<double>(island.constraints.size());
     for (const int id : island.bodies) {
         const MovingBody& body = bodies[static_cast<std::size_t>(id)];
         solved[static_cast<std::size_t>(id)] = 1;
@@ -117,9 +98,12 @@ void World::Implementation::solve_island(const Island& island, bool follow, Isla
     }
 }
 
+bool World::Implementation::is_by_one(const Island& island) const {
+    return island.bodies.size() < kLeastDivided;
+}
+
 // Large islands are shared out, one after the other; of small ones every thread solves its own.
-void World::Implementation::share_islands(const Solve& solve, bool first_round) {
-    if (with) return solve_together(solve, first_round);
+void World::Implementation::share_islands(const Solve& solve) {
     Crew& by = crew();
     const ContactScene shared = contact_scene(by), single = contact_scene(alone);
     // Among ghosts one solver notes what is given to them.
@@ -175,12 +159,10 @@ void World::Implementation::solve_again() {
         to_solve.push_back(&islands[i]);
         for (const int id : islands[i].bodies) solver().forget_crossed(id);
     }
-    share_islands(
-        [this](const Island& island, IslandSolver& by, const ContactScene& scene) {
-            begin_again(island);
-            solve_island(island, true, by, scene);
-        },
-        false);
+    share_islands([this](const Island& island, IslandSolver& by, const ContactScene& scene) {
+        begin_again(island);
+        solve_island(island, true, by, scene);
+    });
     note_found();
     ++counts.solved_again;
 }
@@ -188,7 +170,6 @@ void World::Implementation::solve_again() {
 // The last resort: the island stops where the bodies meet, as it moves then, and these stop approaching each
 // other.
 void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
-    results_checked = false;
     auto at = [this](int id) -> MovingBody& { return bodies[static_cast<std::size_t>(id)]; };
     // Joined bodies would be torn apart: what they meet, they meet in the next step.
     for (const int id : {meeting.a, meeting.b})
@@ -214,7 +195,6 @@ void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
         }
     }
     if (Manifold* manifold = contacts.find_now(meeting.a, meeting.b)) {
-        unpack(*manifold);
         const Kick kick = stop_approach(at(meeting.a), at(meeting.b), manifold->points[0]);
         for (const int id : {meeting.a, meeting.b}) {
             const int other = id == meeting.a ? meeting.b : meeting.a;
@@ -254,12 +234,11 @@ void World::Implementation::solve_islands() {
         ++awake;
         to_solve.push_back(&islands[i]);
     }
-    share_islands([this](const Island& island, IslandSolver& by,
-                         const ContactScene& scene) { solve_island(island, false, by, scene); },
-                  true);
+    share_islands([this](const Island& island, IslandSolver& by, const ContactScene& scene) {
+        solve_island(island, false, by, scene);
+    });
     note_found();
     for (int round = 0; round <= kRounds; ++round) {
-        if (with && contacts.any_left_path(contact_scene(crew()), solved)) share_paths();
         const auto& meetings = contacts.unforeseen(contact_scene(crew()), solved, started);
         if (meetings.empty()) break;
         if (round == kRounds) {

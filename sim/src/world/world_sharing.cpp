@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "world/step_records.h"
 #include "world/world_implementation.h"
 
 // What several worlds of the same bodies, each of which owns some, need of a World.
@@ -118,7 +117,6 @@ void World::contact_records(std::vector<ContactRecord>& out) const {
     for (Manifold& m : implementation_->contacts.manifolds()) {
         const int first = bodies[static_cast<std::size_t>(m.a)].fixed ? m.b : m.a;
         if (!bodies[static_cast<std::size_t>(first)].own) continue;
-        unpack(m);
         out.push_back(record_of(m));
     }
 }
@@ -168,7 +166,6 @@ void World::restore_contacts(const std::vector<ContactRecord>& foreign,
 
 WorldSnapshot World::snapshot() const {
     Implementation& w = *implementation_;
-    w.contacts.unpack_all();
     WorldSnapshot s;
     s.step = w.counts.steps;
     s.bodies.reserve(w.bodies.size());
