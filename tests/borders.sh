@@ -47,5 +47,5 @@ floors() {
     done
 }
 floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare training latency realtime commands
-floors sim bytes shape modes struck world messages shared workers
+floors sim bytes shape modes struck body contact solver world messages shared workers
 exit $status

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "messages/world_record_codec.h"
-#include "world/body_kind.h"
+#include "body/body_kind.h"
 
 namespace sim {
 namespace {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "world/body_kind.h"
-#include "world/manifold.h"
+#include "body/body_kind.h"
+#include "contact/manifold.h"
 
 namespace sim {
 namespace {

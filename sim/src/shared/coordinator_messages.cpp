@@ -5,7 +5,7 @@
 
 #include "shared/coordinator.h"
 #include "shared/replica_protocol.h"
-#include "world/manifold.h"
+#include "contact/manifold.h"
 
 // What members say.
 

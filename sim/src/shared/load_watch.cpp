@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "world/manifold.h"
+#include "contact/manifold.h"
 
 namespace sim {
 

@@ -7,7 +7,7 @@
 #include "shared/body_costs.h"
 #include "shared/replica.h"
 #include "shared/replica_protocol.h"
-#include "world/island_blocks.h"
+#include "solver/island_blocks.h"
 #include "world/partners.h"
 
 namespace sim {

@@ -5,7 +5,7 @@
 #include "messages/world_record_codec.h"
 #include "shared/replica.h"
 #include "sim/errors.h"
-#include "world/manifold.h"
+#include "contact/manifold.h"
 
 namespace sim {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-#include "world/moving_body.h"
+#include "body/moving_body.h"
 
 namespace sim {
 

@@ -3,11 +3,12 @@
 #include <memory>
 #include <vector>
 
+#include "body/prescribed_motion.h"
+#include "contact/crew.h"
+#include "contact/step_contacts.h"
 #include "sim/world.h"
-#include "world/crew.h"
+#include "solver/island_solver.h"
 #include "world/disjoint_sets.h"
-#include "world/island_solver.h"
-#include "world/world_contacts.h"
 
 namespace sim {
 
@@ -25,13 +26,12 @@ struct World::Implementation {
     std::vector<TimedForce> forces;           // ascending by bodies
     std::vector<ActiveForce> active;          // of them in the step, ascending by bodies
     std::vector<std::pair<int, int>> joined;  // pairs that a constraint joins and that do not collide
-    WorldContacts contacts;
-    std::vector<std::unique_ptr<IslandSolver>> solvers;  // one a thread
-    std::unique_ptr<Crew> all = std::make_unique<Crew>();
+    StepContacts contacts;
+    std::vector<std::unique_ptr<IslandSolver>> solvers;     // one a thread
+    std::unique_ptr<Crew> crew = std::make_unique<Crew>();  ///< who shares the work of a step
     Crew alone;
-    [[nodiscard]] Crew& crew() noexcept { return *all; }  ///< who shares the work of a step
     [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
-    void set_threads(std::unique_ptr<Crew> crew);
+    void make_solvers();  ///< one a thread
     std::vector<Island> islands;
     DisjointSets sets;                          ///< of bodies that contacts and constraints join
     std::vector<int> place;                     ///< of a set's first body: the island
@@ -54,17 +54,16 @@ struct World::Implementation {
     WorldCounts counts;
     std::vector<QuarantinedBody> quarantined;
     std::vector<FirstStep> limited, broken;
-    std::vector<std::uint8_t> held_before;                     // constraints, when the last step began
     Eigen::Vector3d outside = Eigen::Vector3d::Zero();         // impulse, see World::outside_impulse
     Eigen::Vector3d outside_before = Eigen::Vector3d::Zero();  // when the last step began
 
     std::vector<int> here;  // bodies that take part in the step, ascending
 
     using Solve = std::function<void(const Island&, IslandSolver&, const ContactScene&)>;
-    bool solving = false;  ///< the step has come so far
+    bool solving = false;    ///< the step has come so far
     bool all_whole = false;  ///< no own body is broken: nothing has changed them since that was seen
     // Sharing.
-    Sharing sharing = Sharing::alone;
+    bool shared = false;       ///< see SharedWorld
     std::vector<int> owned;    // pairs: own and fixed bodies, ascending
     std::vector<int> placed;   // pairs: ghosts of the next step
     std::vector<int> arrived;  // bodies that are own since the last step
@@ -80,6 +79,10 @@ struct World::Implementation {
     int add(const WorldBody& body);   ///< returns its id
     void set_joined();                ///< by constraints
     void drop_constraints(int body);  ///< of a body that is taken out
+    void record(int body, WorldRecord& out) const;
+    void restore(const WorldRecord& record);
+    void restore(const std::vector<SpringRecord>& springs);
+    void set_step(std::uint64_t step);
     [[nodiscard]] SpringRecord spring_record(std::size_t constraint) const;
     bool restore_spring(const SpringRecord& record);     ///< whether it held otherwise
     void pose(MovingBody& body);                         ///< for contact tests
@@ -91,8 +94,7 @@ struct World::Implementation {
     [[nodiscard]] bool is_own(const Island& island) const;  ///< has an own body
     [[nodiscard]] bool any_awake() const;
     void place_driven(MovingBody& body);
-    void set_driven(MovingBody& body, const BodyPath::Pose& now, const Eigen::Vector3d& velocity,
-                    const Eigen::Vector3d& spin);
+    void set_driven(MovingBody& body, const PrescribedState& now);
     void begin_motions();
     void end_motions();
     void find_forces();  // and who they wake
@@ -114,18 +116,21 @@ struct World::Implementation {
     void note_found();                           ///< contacts, by the islands that have just been solved
     void move_alone(int body);                   ///< over the step
     void solve_again();                          ///< islands of bodies in `again`, from the step's start
-    void hold_apart(const WorldContacts::Meeting& meeting);
-    std::vector<WorldContacts::Meeting> last;  ///< what meets after all rounds
-    void sum_outcomes();                       ///< of all islands
+    void hold_apart(const StepContacts::Meeting& meeting);
+    std::vector<StepContacts::Meeting> last;  ///< what meets after all rounds
+    void sum_outcomes();                      ///< of all islands
     [[nodiscard]] ContactScene contact_scene(Crew& crew);
     [[nodiscard]] bool is_held(const Island& island) const;
     [[nodiscard]] bool drifts(const Island& island) const;
-    void put_to_sleep();                              ///< islands that are still
-    void count_work();                                ///< see World::work
-    void step();                                      ///< see World::step
-    [[nodiscard]] int still_steps_to_sleep() const;   ///< half a second
-    void tell_broken(std::uint64_t broken_before);    ///< constraints, of the step
-    void tell_limited(std::uint64_t limited_before);  ///< bodies, of the step
+    void put_to_sleep();                             ///< islands that are still
+    void count_work();                               ///< see World::work
+    void step();                                     ///< see World::step
+    [[nodiscard]] int still_steps_to_sleep() const;  ///< half a second
+    void list_broken();                              ///< constraints, of the step
+    void list_limited();                             ///< bodies, of the step
+    void begin_step();
+    void end_step();
+    void pose_bodies();
 };
 
 }  // namespace sim

@@ -60,6 +60,10 @@ Eigen::Vector3d World::angular_momentum() const {
     return sum;
 }
 
+Eigen::Vector3d World::outside_impulse() const {
+    return implementation_->outside;
+}
+
 std::uint64_t World::state_hash() const {
     std::uint64_t hash = 0xcbf29ce484222325u;
     auto mix = [&hash](double value) {

@@ -44,7 +44,7 @@ Kick stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint& point) {
 }  // namespace
 
 ContactScene World::Implementation::contact_scene(Crew& by) {
-    return {settings, planes, joined, bodies, here, sharing == Sharing::pairs, by};
+    return {settings, planes, joined, bodies, here, shared, by};
 }
 
 void World::Implementation::start_solving() {
@@ -57,7 +57,7 @@ void World::Implementation::start_solving() {
     // Of others' bodies alone, too: own ones may meet them unforeseen.
     for (std::size_t i = 0; i < islands_used; ++i) {
         const std::vector<int>& of_island = islands[i].bodies;
-        crew().each(of_island.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
+        crew->each(of_island.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
             for (std::size_t k = first; k < end; ++k) {
                 const auto at = static_cast<std::size_t>(of_island[k]);
                 started[at] = bodies[at].state;
@@ -86,7 +86,7 @@ void World::Implementation::solve_island(const Island& island, bool follow, Isla
     if (island.manifolds.empty() && island.constraints.empty() && !is_forced(island.bodies.front()))
         return move_alone(island.bodies.front());
     const std::uint64_t limits = by.deformations_limited(), breaks = by.constraints_broken();
-    by.solve(island, scene, follow && by.may_follow(island));
+    by.solve(island, scene, follow);
     if (const std::vector<Manifold>* found = by.found()) outcome.found = true, outcome.manifolds = *found;
     outcome.limited = by.deformations_limited() - limits;
     outcome.broken = by.constraints_broken() - breaks;
@@ -104,15 +104,15 @@ bool World::Implementation::is_by_one(const Island& island) const {
 
 // Large islands are shared out, one after the other; of small ones every thread solves its own.
 void World::Implementation::share_islands(const Solve& solve) {
-    Crew& by = crew();
-    const ContactScene shared = contact_scene(by), single = contact_scene(alone);
+    Crew& by = *crew;
+    const ContactScene by_all = contact_scene(by), by_one = contact_scene(alone);
     // Among ghosts one solver notes what is given to them.
-    if (by.size() == 1 || sharing == Sharing::pairs) {
-        for (const Island* island : to_solve) solve(*island, solver(), is_by_one(*island) ? single : shared);
+    if (by.size() == 1 || shared) {
+        for (const Island* island : to_solve) solve(*island, solver(), is_by_one(*island) ? by_one : by_all);
         return;
     }
     for (const Island* island : to_solve)
-        if (!is_by_one(*island)) solve(*island, solver(), shared);
+        if (!is_by_one(*island)) solve(*island, solver(), by_all);
     small.clear();
     std::ranges::copy_if(to_solve, std::back_inserter(small),
                          [this](const Island* island) { return is_by_one(*island); });
@@ -125,7 +125,7 @@ void World::Implementation::share_islands(const Solve& solve) {
     });
     by.each(small.size(), 1, [&](int thread, std::size_t first, std::size_t end) {
         for (std::size_t i = first; i < end; ++i)
-            solve(*small[i], *solvers[static_cast<std::size_t>(thread)], single);
+            solve(*small[i], *solvers[static_cast<std::size_t>(thread)], by_one);
     });
 }
 
@@ -157,7 +157,7 @@ void World::Implementation::solve_again() {
                                      [this](int id) { return again[static_cast<std::size_t>(id)] != 0; });
         if (!any || !is_own(islands[i])) continue;
         to_solve.push_back(&islands[i]);
-        for (const int id : islands[i].bodies) solver().forget_crossed(id);
+        for (const int id : islands[i].bodies) solver().cross().forget(id);
     }
     share_islands([this](const Island& island, IslandSolver& by, const ContactScene& scene) {
         begin_again(island);
@@ -169,7 +169,7 @@ void World::Implementation::solve_again() {
 
 // The last resort: the island stops where the bodies meet, as it moves then, and these stop approaching each
 // other.
-void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
+void World::Implementation::hold_apart(const StepContacts::Meeting& meeting) {
     auto at = [this](int id) -> MovingBody& { return bodies[static_cast<std::size_t>(id)]; };
     // Joined bodies would be torn apart: what they meet, they meet in the next step.
     for (const int id : {meeting.a, meeting.b})
@@ -203,7 +203,7 @@ void World::Implementation::hold_apart(const WorldContacts::Meeting& meeting) {
             if (!at(other).moves())
                 outcomes[static_cast<std::size_t>(island_of(id).bodies.front())].outside += on_it;
             else if (!at(other).own)
-                solver().add_crossed({id, other, true, on_it,
+                solver().cross().add({id, other, true, on_it,
                                       (kick.place - at(id).state.position).cross(on_it),
                                       (kick.place - at(other).state.position).cross(-on_it)});
         }
@@ -239,17 +239,17 @@ void World::Implementation::solve_islands() {
     });
     note_found();
     for (int round = 0; round <= kRounds; ++round) {
-        const auto& meetings = contacts.unforeseen(contact_scene(crew()), solved, started);
+        const auto& meetings = contacts.unforeseen(contact_scene(*crew), solved, started);
         if (meetings.empty()) break;
         if (round == kRounds) {
             last = meetings;
             // The first last: an island stops where it meets first.
             std::sort(last.begin(), last.end(), [](const auto& a, const auto& b) { return a.time > b.time; });
-            for (const WorldContacts::Meeting& meeting : last) hold_apart(meeting);
+            for (const StepContacts::Meeting& meeting : last) hold_apart(meeting);
             break;
         }
         again.assign(bodies.size(), 0);
-        for (const WorldContacts::Meeting& meeting : meetings)
+        for (const StepContacts::Meeting& meeting : meetings)
             again[static_cast<std::size_t>(meeting.a)] = again[static_cast<std::size_t>(meeting.b)] = 1;
         solve_again();
     }
