@@ -27,6 +27,33 @@ double largest_gradient(const MovingBody& body) {
 
 }  // namespace
 
+MovingBody moving_body(const WorldBody& definition, const BodyKind& kind, const WorldSettings& settings) {
+    MovingBody body;
+    body.kind = &kind;
+    body.fixed = !definition.moves();
+    body.motion = definition.motion;
+    body.gravity_scale = definition.gravity_scale;
+    body.friction = static_cast<float>(definition.friction);
+    body.restitution = static_cast<float>(definition.restitution);
+    const Eigen::Quaterniond orientation(definition.world_from_body.rotation());
+    const Eigen::Matrix3d r = orientation.toRotationMatrix();
+    const Eigen::Vector3d momentum =
+        r * kind.mass.inertia.cwiseProduct(r.transpose() * definition.angular_velocity);
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(kind.modes);
+    body.state = {definition.world_from_body.translation(),
+                  orientation,
+                  body.fixed ? Eigen::Vector3d::Zero() : definition.velocity,
+                  body.fixed ? Eigen::Vector3d::Zero() : momentum,
+                  zero,
+                  zero};
+    body.posed.kind = &kind;
+    body.substep_rotation = FreeRotation(kind.mass.inertia, settings.dt / settings.substeps);
+    body.step_rotation = FreeRotation(kind.mass.inertia, settings.dt);
+    body.modal_force = zero;
+    body.given.modal = zero;
+    return body;
+}
+
 void move_freely(MovingBody& body, const WorldSettings& settings) {
     WorldBodyState& s = body.state;
     const double dt = settings.dt;

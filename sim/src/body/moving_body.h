@@ -41,6 +41,10 @@ struct MovingBody {
 
 constexpr int kMostStillSteps = 65535;
 
+/// As defined, at rest in its modes, not yet posed. `kind`: of it; must stay.
+[[nodiscard]] MovingBody moving_body(const WorldBody& definition, const BodyKind& kind,
+                                     const WorldSettings& settings);
+
 /// Free motion over a whole step: parabola, free rotation, exact modes. For bodies that touch nothing.
 void move_freely(MovingBody& body, const WorldSettings& settings);
 

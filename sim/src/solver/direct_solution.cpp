@@ -13,7 +13,6 @@ namespace {
 
 // Multiply-adds per body, see most_with_contacts and most_with_springs.
 constexpr double kMostWithContacts = 500, kMostWithSprings = 1e4;
-constexpr float kPushSpeed = 3;  // at which bodies inside each other are moved apart at most [m/s]
 constexpr double kFirm = 1e-9;   // least compliance of a spring, share of the bodies' own
 constexpr double kSoft = 3e-4;   // compliance of an overlap over a substep, share of the bodies' own, at most
 // At which an overlap carries its load of the substep before, share of the bodies' size.

@@ -102,6 +102,9 @@ struct SpringRows : Rows {
     float kept[3], strike[3];        ///< its speeds before [m/s], its impulse [N s]
 };
 
+/// At which bodies inside each other are moved apart at most [m/s]: faster, deep ones would be thrown.
+constexpr float kPushSpeed = 3;
+
 /// By how much a unit of impulse moves a spring's ends apart, mean over its directions [1/kg].
 [[nodiscard]] inline double mobility_of(const SpringRows& s) noexcept {
     return static_cast<double>(s.k[0][0] + s.k[1][1] + s.k[2][2]) / s.point->held;

@@ -12,7 +12,6 @@ namespace {
 
 // How overlaps of swept contacts are pushed out, as a damped spring of the pair: [Hz], and damping ratio.
 constexpr double kPushHz = 30, kPushDamping = 10;
-constexpr float kPushSpeed = 3;      // at which bodies inside each other are moved apart at most [m/s]
 constexpr double kFrameTurn = 0.05;  // of a body, beyond which its frame and rows follow it [rad]
 
 float length(float x, float y) {

@@ -19,29 +19,7 @@ const BodyKind* World::Implementation::kind_of(const WorldBody& body) {
 
 int World::Implementation::add(const WorldBody& definition) {
     check_world_body(definition);
-    MovingBody body;
-    body.kind = kind_of(definition);
-    body.fixed = !definition.moves();
-    body.motion = definition.motion;
-    body.gravity_scale = definition.gravity_scale;
-    body.friction = static_cast<float>(definition.friction);
-    body.restitution = static_cast<float>(definition.restitution);
-    const Eigen::Quaterniond orientation(definition.world_from_body.rotation());
-    const Eigen::Matrix3d r = orientation.toRotationMatrix();
-    const Eigen::Vector3d momentum =
-        r * body.kind->mass.inertia.cwiseProduct(r.transpose() * definition.angular_velocity);
-    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(body.kind->modes);
-    body.state = {definition.world_from_body.translation(),
-                  orientation,
-                  body.fixed ? Eigen::Vector3d::Zero() : definition.velocity,
-                  body.fixed ? Eigen::Vector3d::Zero() : momentum,
-                  zero,
-                  zero};
-    body.posed.kind = body.kind;
-    body.substep_rotation = FreeRotation(body.kind->mass.inertia, settings.dt / settings.substeps);
-    body.step_rotation = FreeRotation(body.kind->mass.inertia, settings.dt);
-    body.modal_force = zero;
-    body.given.modal = zero;
+    MovingBody body = moving_body(definition, *kind_of(definition), settings);
     definitions.push_back(definition);
     bodies.push_back(std::move(body));
     all_whole = false;

@@ -9,7 +9,7 @@
 #include "messages/crc32c.h"
 #include "messages/update_codec.h"
 #include "sealed_message.h"
-#include "world/manifold.h"
+#include "contact/manifold.h"
 #include "world_bodies.h"
 
 namespace {

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <limits>
 
-#include "world/body_kind.h"
+#include "body/body_kind.h"
 #include "world_bodies.h"
 
 using namespace world_test;

@@ -1,4 +1,4 @@
-#include "world/implicit_contact.h"
+#include "contact/implicit_contact.h"
 
 #include <gtest/gtest.h>
 

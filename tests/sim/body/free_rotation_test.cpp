@@ -1,4 +1,4 @@
-#include "world/free_rotation.h"
+#include "body/free_rotation.h"
 
 #include <gtest/gtest.h>
 

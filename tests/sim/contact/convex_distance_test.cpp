@@ -1,4 +1,4 @@
-#include "world/convex_distance.h"
+#include "contact/convex_distance.h"
 
 #include <gtest/gtest.h>
 
