@@ -35,7 +35,7 @@ ForeignBodies::Heard* ForeignBodies::slot(std::uint32_t worker, std::uint64_t st
     Heard& slot = slots[step % keep_];
     if (slot.step > step) return nullptr;
     if (std::exchange(slot.step, step) != step) {
-        slot.there = false, slot.heard = slot.own_number = 0;
+        slot.there = false, slot.heard = 0;
         slot.bodies.clear(), slot.crossed.clear();
     }
     return &slot;
@@ -50,10 +50,6 @@ const ForeignBodies::Heard* ForeignBodies::heard(std::uint32_t worker, std::uint
 
 void ForeignBodies::keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed) {
     if (Heard* own = slot(self_, step)) own->crossed = crossed, own->there = true;
-}
-
-void ForeignBodies::telling(std::uint32_t worker, std::uint64_t step, std::uint32_t number) {
-    if (Heard* heard = slot(worker, step)) heard->own_number = number;
 }
 
 void ForeignBodies::nothing_until(std::uint32_t worker, std::uint64_t step) {
@@ -206,7 +202,7 @@ void ForeignBodies::add_owed(int body) {
     const auto blow = [](const CrossImpulse& c) { return c.blow; };
     for (std::uint64_t step = told_.step, left = keep_; step > 0 && left > 0; --step, --left) {
         const Heard& theirs = slots->second[step % keep_];
-        if (theirs.step != step || theirs.own_number <= told_.heard) return;  // it knew
+        if (theirs.step != step || step <= told_.heard) return;  // it knew
         const Heard* own = heard(self_, step);
         if (!own || (std::ranges::none_of(own->crossed, blow) && std::ranges::none_of(theirs.crossed, blow)))
             continue;

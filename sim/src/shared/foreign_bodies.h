@@ -11,7 +11,7 @@ namespace sim {
 /// a stack swing each other up (tests/sim/shared/shared_stack_test.cpp).
 constexpr int kHeldSteps = 32;
 
-/// What one worker has heard of the others in bounded pace: their messages of the last steps, and from them the states of
+/// What one worker has heard of the others: their messages of the last steps, and from them the states of
 /// those of their bodies that are near at any step near these.
 class ForeignBodies {
 public:
@@ -22,8 +22,7 @@ public:
     struct Heard {
         std::uint64_t step = 0;
         bool there = false;       ///< its message has come, or none will
-        std::uint32_t heard = 0;  ///< number of the last message of this worker that it had heard by then
-        std::uint32_t own_number = 0;  ///< of this worker's message to it of the step; 0: none
+        std::uint64_t heard = 0;  ///< step of this worker's last message that it had heard by then
         PackedUpdates bodies;
         std::vector<CrossImpulse> crossed;
     };
@@ -31,8 +30,6 @@ public:
     void take(std::uint32_t worker, std::uint64_t step, NeighbourMessage&& message,
               const std::vector<std::uint32_t>& owner);
     void keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed);
-    /// A worker is told of own bodies in a step, by the message of this number.
-    void telling(std::uint32_t worker, std::uint64_t step, std::uint32_t number);
     /// Of a worker's steps up to this one nothing more will come but what add() takes.
     void nothing_until(std::uint32_t worker, std::uint64_t step);
     /// What a worker found in a step, beside what it has told of that.
@@ -77,7 +74,8 @@ private:
     struct Told {
         std::uint64_t step = 0;
         Update update;
-        std::uint32_t worker = kApplication, heard = 0;  ///< who told it, see Heard
+        std::uint32_t worker = kApplication;  ///< who told it
+        std::uint64_t heard = 0;              ///< see Heard
     };
     struct Glance {
         Eigen::Vector3d position = Eigen::Vector3d::Zero(), velocity = position;  // [m], [m/s]

@@ -17,7 +17,7 @@ namespace sim {
     return 2 * comparison_steps(bound);
 }
 
-/// Contacts between bodies of two owners, in bounded pace. Both owners resolve them, each against the ghost that it knows, and
+/// Contacts between bodies of two owners. Both owners resolve them, each against the ghost that it knows, and
 /// tell what they found. A body that got I from its own owner's solution of a step, and I' by the other one's, is put right by
 /// (I' - I) / 2; the other body by the opposite, so momentum is kept to the last bit. (Both solve the interface and
 /// split the difference: an additive Schwarz method, here a step late: chaotic relaxation, Chazan and Miranker 1969.)

@@ -9,7 +9,7 @@ namespace sim {
 /// Most bodies of a structure: 256 if at least three quarters of them are flat and upright, as in a wall, else 64.
 constexpr std::size_t kMostInStructure = 64, kMostStanding = 256;
 
-/// Structures among an owner's bodies, for bounded pace: bodies side by side or on each other that are slow, touched by at most
+/// Structures among an owner's bodies: bodies side by side or on each other that are slow, touched by at most
 /// a quarter as many of other owners' bodies. They stay on one worker: what several hold keeps swaying by some centimetres a
 /// second, which a heap may and what has to stand may not.
 ///
@@ -56,7 +56,7 @@ private:
 
 /// Factors by which bodies that are shared out may differ.
 constexpr double kMostUnlikeMass = 4, kMostUnlikeLength = 3;
-/// Whether lots that are in no structure are like each other and like those that are: by the heaviest and the longest body of each. Others bounded pace gives to one
+/// Whether lots that are in no structure are like each other and like those that are: by the heaviest and the longest body of each. Others are given to one
 /// worker. A body is held up by what other workers told some steps ago; the heavier it is than what holds it, or the more
 /// workers' bodies it lies on, the larger is the answer that comes late, until it grows from step to step. `world` has
 /// all bodies of the lots.

@@ -53,8 +53,8 @@ public:
 };
 
 sim::DistributedSettings bounded(std::uint64_t steps, int bound) {
-    sim::DistributedSettings settings = lockstep(steps);
-    settings.pace = sim::Pace::bounded, settings.bound = bound;
+    sim::DistributedSettings settings = for_steps(steps);
+    settings.bound = bound;
     return settings;
 }
 
