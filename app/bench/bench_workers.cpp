@@ -66,7 +66,6 @@ sim::WorldScene scene_of(int bodies) {
 
 sim::DistributedSettings settings_of(int steps, int bound, bool balance) {
     sim::DistributedSettings settings;
-    settings.pace = bound > 0 ? sim::Pace::bounded : sim::Pace::lockstep;
     settings.bound = bound;
     settings.steps = std::uint64_t(steps);
     settings.market.trade = balance;
@@ -92,8 +91,6 @@ public:
                 "other load makes steps uneven, so that workers wait.");
     }
 
-    /// Lockstep solves a pile that crosses workers at each of them; a barrier's cost alone is that of the
-    /// asynchronous run's own steps with one (critical_path_s).
     void stragglers() {
         const int workers = most_workers_;
         const sim::WorldScene scene = scene_of(most_bodies_);
@@ -101,43 +98,38 @@ public:
         const Factor wandering = [workers](int worker, std::uint64_t step) {
             return sim_bench::wandering(workers, worker, step);
         };
+        const auto elapsed = [&](const Way& way) { return measure(scene, workers, way).result.elapsed_s; };
         const auto compare = [&](const std::string& name, const Factor& factor, int bound) {
             progress_("stragglers: " + name);
-            const SharedRun lockstep = measure(scene, workers, {0, false, factor}),
-                            async = measure(scene, workers, {bound, false, factor});
-            add(name + "_lockstep_elapsed", lockstep.result.elapsed_s, "s");
-            add(name + "_async_elapsed", async.result.elapsed_s, "s");
-            add(name + "_async_over_lockstep", lockstep.result.elapsed_s / async.result.elapsed_s,
-                "times as fast");
-            add(name + "_async_over_barrier", async.critical_path_s() / async.result.elapsed_s,
-                "times as fast");
-            return std::pair{lockstep.result.elapsed_s, async.critical_path_s()};
+            const double barrier = elapsed({0, false, factor}), async = elapsed({bound, false, factor});
+            add(name + "_barrier_elapsed", barrier, "s");
+            add(name + "_async_elapsed", async, "s");
+            add(name + "_async_over_barrier", barrier / async, "times as fast");
+            return barrier;
         };
-        const auto [lockstep, barrier] = compare("straggler_permanent_unbalanced", permanent, options_.bound);
+        const double barrier = compare("straggler_permanent_unbalanced", permanent, options_.bound);
         progress_("stragglers: permanent, balanced");
-        const double balanced = measure(scene, workers, {options_.bound, true, permanent}).result.elapsed_s,
-                     balanced_lockstep = measure(scene, workers, {0, true, permanent}).result.elapsed_s;
+        const double balanced = elapsed({options_.bound, true, permanent}),
+                     balanced_barrier = elapsed({0, true, permanent});
         const std::string async_name = "straggler_permanent_async_balanced_",
-                          lockstep_name = "straggler_permanent_lockstep_balanced_";
+                          barrier_name = "straggler_permanent_barrier_balanced_";
         add(async_name + "elapsed", balanced, "s");
-        add(lockstep_name + "elapsed", balanced_lockstep, "s");
-        add(async_name + "over_lockstep", lockstep / balanced, "times as fast");
+        add(barrier_name + "elapsed", balanced_barrier, "s");
         add(async_name + "over_barrier", barrier / balanced, "times as fast");
-        add(lockstep_name + "over_lockstep", lockstep / balanced_lockstep, "times as fast");
+        add(barrier_name + "over_barrier", barrier / balanced_barrier, "times as fast");
         std::vector<double> gains{barrier / balanced};
         for (int slow = 1; slow < workers; ++slow) {  // what they have at first differs
             progress_(fmt::format("stragglers: permanent, worker {}", slow));
             const Factor half = [slow](int worker, std::uint64_t) { return worker == slow ? 2.0 : 1.0; };
-            gains.push_back(measure(scene, workers, {options_.bound, false, half}).critical_path_s() /
-                            measure(scene, workers, {options_.bound, true, half}).result.elapsed_s);
+            gains.push_back(elapsed({0, false, half}) / elapsed({options_.bound, true, half}));
         }
         std::ranges::sort(gains);
         const std::string each_name = "straggler_permanent_each_async_balanced_over_barrier_";
         add(each_name + "median", quantile(gains, 0.5), "times as fast");
         add(each_name + "least", gains.front(), "times as fast");
         add(each_name + "most", gains.back(), "times as fast");
-        compare("straggler_unsteady_b4", sim_bench::unsteady, 4);
-        compare("straggler_wandering_b16", wandering, 16);
+        (void)compare("straggler_unsteady_b4", sim_bench::unsteady, 4);
+        (void)compare("straggler_wandering_b16", wandering, 16);
         note(
             "A permanent straggler without balancing gains nothing by asynchrony: once the others are B "
             "steps ahead they wait for it at every step, so all go at its pace. Only less work helps it: "
@@ -147,24 +139,22 @@ public:
     void bounds() {
         const int workers = most_workers_;
         const sim::WorldScene scene = scene_of(most_bodies_);
-        SharedRun lockstep;
+        const SharedRun alone = sim_bench::measure_alone(scene, settings_of(options_.steps, 0, false));
         for (const int bound : {0, 1, 2, 4, 8, 16, 32}) {
             progress_(fmt::format("bound {}", bound));
             MomentumObserver momentum(scene, std::uint64_t(options_.steps));
             SharedRun run = measure(scene, workers, {bound, false}, &momentum);
-            if (bound == 0) lockstep = run;
             const SharedRun slow = measure(scene, workers, {bound, false, sim_bench::unsteady});
             bench_.bounds.push_back({bound, run.result.elapsed_s, slow.result.elapsed_s,
-                                     momentum.drift(run.result.outside_impulse),
-                                     sim_bench::apart(run, lockstep), run.mean_height / lockstep.mean_height,
-                                     run.result.largest_ghost_age});
+                                     momentum.drift(run.result.outside_impulse), sim_bench::apart(run, alone),
+                                     run.mean_height / alone.mean_height, run.result.largest_ghost_age});
             const BoundRow& row = bench_.bounds.back();
             const std::string name = fmt::format("bound{}", bound);
             add(name + "_elapsed", row.elapsed_s, "s");
             add(name + "_unsteady_elapsed", row.elapsed_unsteady_s, "s");
             add(name + "_momentum_drift", row.momentum_drift, "of sum |m v|");
             add(name + "_apart_after_a_second", row.apart_m, "m rms");
-            add(name + "_height_at_end", row.height, "times lockstep's");
+            add(name + "_height_at_end", row.height, "times one process's");
         }
     }
 
@@ -201,15 +191,14 @@ public:
                 sim_bench::measure_threads(scene_of(bodies).world, counts, options_.steps, options_.rounds);
             for (const sim_bench::ThreadsSpeed& speed : all) {
                 const std::string name = fmt::format("threads_bodies{}_threads{}", bodies, speed.threads);
-                add_times(name, {speed.elapsed_s, speed.critical_path_s},
-                          {all.front().elapsed_s, all.front().critical_path_s});
+                add(name + "_elapsed", speed.elapsed_s, "s");
+                add(name + "_speed_up", all.front().elapsed_s / speed.elapsed_s, "times one");
                 add(name + "_cpu", speed.cpu_s, "s, all threads");
             }
         }
         note(fmt::format(
-            "threads: {} steps, medians of {}, in turns of 25 steps, times one thread. Critical path: by "
-            "one thread that times every piece that threads would share out and gives it to the one that "
-            "would be free first; processor time, so other load does not count.",
+            "threads: {} steps, medians of {} by the wall clock, in turns of 25 steps, times one thread; other "
+            "load on the machine makes them slower.",
             options_.steps, options_.rounds));
     }
 
@@ -220,7 +209,9 @@ public:
             "processes: {} steps, medians of {} runs in turns, times one process without workers; at most "
             "{} workers, this machine's cores, which the application shares. Critical path: by "
             "processor time of the workers' stepping threads, with their messages, if each step waited for "
-            "all others' step before it (async: for the one before that).",
+            "all others' step before it (async: for the one before that). async: with the bound; barrier: "
+            "with "
+            "a bound of 0.",
             options_.steps, options_.rounds, cores()));
     }
 
@@ -291,7 +282,7 @@ public:
 
 private:
     struct Way {
-        int bound = 0;  ///< 0: lockstep
+        int bound = 0;
         bool balance = false;
         Factor factor = {};
         bool warm = false;
@@ -322,12 +313,12 @@ private:
             if (workers > 1) {
                 const SharedRun async = measure(scene, workers, {options_.bound, true, {}, true});
                 row.async = run_of(async);
-                row.lockstep = run_of(measure(scene, workers, {0, true, {}, true}));
+                row.barrier = run_of(measure(scene, workers, {0, true, {}, true}));
                 row.bytes = double(async.result.bytes) / double(std::max<std::uint64_t>(1, async.body_steps));
             }
             speed_up.rows.push_back(row);
             const std::string name = fmt::format("bodies{}_workers{}_", bodies, workers);
-            for (const auto& [pace, run] : {std::pair("async", row.async), {"lockstep", row.lockstep}}) {
+            for (const auto& [pace, run] : {std::pair("async", row.async), {"barrier", row.barrier}}) {
                 add(name + pace + "_elapsed", run.elapsed_s, "s");
                 add(name + pace + "_speed_up", alone.elapsed_s / run.elapsed_s, "times one");
                 if (run.busiest_s > 0)
@@ -369,7 +360,7 @@ private:
                     if (workers > cores()) continue;
                     sim::DistributedLaunch launch;
                     launch.processes = {options_.program, {"worker"}, workers};
-                    take(fmt::format("{}workers{}_{}", prefix, workers, bound > 0 ? "async" : "lockstep"),
+                    take(fmt::format("{}workers{}_{}", prefix, workers, bound > 0 ? "async" : "barrier"),
                          sim_bench::measure_run(scene, settings_of(options_.steps, bound, true), launch),
                          std::min(bound, 1));
                 }
@@ -419,7 +410,7 @@ std::string panel(const SpeedUp& s, const Shown& of) {
     };
     add("#8c8c8c", "ideal", 1, [&](const SpeedUp::Row& row) { return s.alone_s / row.workers; });
     add("#2468b4", "asynchronous", 1, [](const SpeedUp::Row& row) { return row.async.elapsed_s; });
-    add("#e03131", "lockstep", 2, [](const SpeedUp::Row& row) { return row.lockstep.elapsed_s; });
+    add("#e03131", "barrier", 2, [](const SpeedUp::Row& row) { return row.barrier.elapsed_s; });
     return panel.text();
 }
 
@@ -441,12 +432,12 @@ Table table_of(std::span<const SpeedUp> speed_ups) {
                                {"workers:d", r.workers},
                                {"ideal_s:.3g", s.alone_s / r.workers},
                                {"async_s:.3g", r.async.elapsed_s},
-                               {"lockstep_s:.3g", r.lockstep.elapsed_s},
+                               {"barrier_s:.3g", r.barrier.elapsed_s},
                                {"bytes_per_body_step:.0f", r.bytes},
                                {"async_speed_up:.2f", s.alone_s / r.async.elapsed_s, false},
-                               {"lockstep_speed_up:.2f", s.alone_s / r.lockstep.elapsed_s, false},
+                               {"barrier_speed_up:.2f", s.alone_s / r.barrier.elapsed_s, false},
                                {"async_cold_caches:.2f", r.async.cold_caches, false},
-                               {"lockstep_cold_caches:.2f", r.lockstep.cold_caches, false}});
+                               {"barrier_cold_caches:.2f", r.barrier.cold_caches, false}});
     return table;
 }
 
@@ -478,8 +469,8 @@ Figures figures_of(const WorkersBench& bench) {
     for (const SpeedUp& s : bench.speed_ups) {
         text += fmt::format("{} bodies: {:.3g} s on one processor\n{}\n", s.bodies, s.alone_s,
                             table_of(std::span(&s, 1))
-                                .part({"workers", "async_speed_up", "lockstep_speed_up", "async_cold_caches",
-                                       "lockstep_cold_caches", "bytes_per_body_step"})
+                                .part({"workers", "async_speed_up", "barrier_speed_up", "async_cold_caches",
+                                       "barrier_cold_caches", "bytes_per_body_step"})
                                 .text());
         figures.plots[fmt::format("speed_up/bodies{}.svg", s.bodies)] = speed_up_plot(s);
     }

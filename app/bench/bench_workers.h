@@ -23,8 +23,8 @@ struct SpeedUp {
     };
     struct Row {
         int workers = 1;
-        Run async, lockstep;
-        double bytes = 0;  ///< a body's step, asynchronously
+        Run async, barrier;  ///< with the bound that was asked for, with a bound of 0
+        double bytes = 0;    ///< a body's step, of async
     };
     int bodies = 0;
     double alone_s = 0;  ///< one processor
@@ -33,12 +33,12 @@ struct SpeedUp {
 
 /// One row of the table of B against speed and error.
 struct BoundRow {
-    int bound = 0;  ///< 0: lockstep
+    int bound = 0;
     double elapsed_s = 0;
     double elapsed_unsteady_s = 0;  ///< with every step slow (2x) with probability 0.2
     double momentum_drift = 0;      ///< share of the largest sum of |m v|
-    double apart_m = 0;             ///< rms distance of centres from lockstep's after a second
-    double height = 0;              ///< mean at the end over lockstep's
+    double apart_m = 0;             ///< rms distance of centres from one process's after a second
+    double height = 0;              ///< mean at the end over one process's
     int ghost_age = 0;              ///< largest [steps]
 };
 

@@ -42,6 +42,17 @@ std::string full_name(const CLI::App& command) {
                                 : command.get_name();
 }
 
+/// What to use in place of an option that is there no more; empty: it never was.
+std::string instead_of(const std::string& command, const std::string& option) {
+    const std::string name = option.substr(0, option.find('='));
+    if (command != "musicworld simulate" || (name != "--mode" && name != "--verify")) return {};
+    return fmt::format(
+        "{} is gone: workers are always out of step by at most --bound steps; --bound 0 is a barrier after "
+        "each "
+        "step; for the bits of one process use --workers 0 with --threads N",
+        name);
+}
+
 /// "found ..., expected ..." for a line that CLI11 did not understand; `at` is the last command that it did.
 std::string explain(const CLI::App& at, const std::string& what) {
     const std::string name = full_name(at), help = fmt::format("see `{} --help`", name);
@@ -56,6 +67,8 @@ std::string explain(const CLI::App& at, const std::string& what) {
     std::vector<std::string> options = {"--help"};
     for (const DeclaredOption& option : declared.options)
         if (!option.argument()) options.push_back(option.name);
+    for (const std::string& word : rest)
+        if (const std::string instead = instead_of(name, word); !instead.empty()) return instead;
     if (!rest.empty() && rest.front().starts_with('-'))
         return fmt::format("found {}, expected an option of `{}`{}", rest.front(), name,
                            nearest_hint(rest.front(), options));

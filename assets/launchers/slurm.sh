@@ -22,5 +22,5 @@ trap 'rm -rf "$keys"' EXIT
 srun --overlap --kill-on-bad-exit=0 "$musicworld" worker \
     --connect "tcp://$SLURMD_NODENAME:$port" --key "$keys/slurm.key" &
 "$musicworld" simulate "$scene" --listen "tcp://0.0.0.0:$port" --keys "$keys" --expect "$SLURM_NTASKS" \
-    --mode "${MODE:-async}" --out "$out"
+    --bound "${BOUND:-4}" --out "$out"
 wait

@@ -25,5 +25,5 @@ for host in "$@"; do
 done
 # Workers look for the application for 10 s, so it may start last; they end when it does.
 "$musicworld" simulate "$scene" --listen "tcp://0.0.0.0:$port" --keys "$folder/keys" --expect "$#" \
-    --mode "${MODE:-async}" --out "$out"
+    --bound "${BOUND:-4}" --out "$out"
 wait

@@ -9,35 +9,30 @@ namespace {
 
 constexpr int kTurn = 25;  // steps
 
-/// A world with so many threads, and the same with them planned.
-struct Pair {
-    Pair(const sim::WorldDefinition& definition, int threads)
-        : threaded(definition), planned(definition), sum{threads} {
-        threaded.use_threads(threads);
-        planned.plan_threads(threads);
+/// A world with so many threads.
+struct Threaded {
+    Threaded(const sim::WorldDefinition& definition, int threads) : world(definition), sum{threads} {
+        world.use_threads(threads);
     }
     void step(int steps) {
         const double wall = wall_s(), all = process_cpu_s();
-        for (int i = 0; i < steps; ++i) threaded.step();
+        for (int i = 0; i < steps; ++i) world.step();
         sum.elapsed_s += wall_s() - wall;
         sum.cpu_s += process_cpu_s() - all;
-        const double cpu = thread_cpu_s(), saved = planned.saved_by_threads_s();
-        for (int i = 0; i < steps; ++i) planned.step();
-        sum.critical_path_s += thread_cpu_s() - cpu - (planned.saved_by_threads_s() - saved);
     }
 
-    sim::World threaded, planned;
+    sim::World world;
     ThreadsSpeed sum;
 };
 
 std::vector<ThreadsSpeed> one_round(const sim::WorldDefinition& definition, const std::vector<int>& threads,
                                     int steps) {
-    std::vector<Pair> pairs;
-    for (const int count : threads) pairs.emplace_back(definition, count);
+    std::vector<Threaded> worlds;
+    for (const int count : threads) worlds.emplace_back(definition, count);
     for (int done = 0; done < steps; done += kTurn)
-        for (Pair& pair : pairs) pair.step(std::min(kTurn, steps - done));
+        for (Threaded& one : worlds) one.step(std::min(kTurn, steps - done));
     std::vector<ThreadsSpeed> sums;
-    for (const Pair& pair : pairs) sums.push_back(pair.sum);
+    for (const Threaded& one : worlds) sums.push_back(one.sum);
     return sums;
 }
 
@@ -54,8 +49,7 @@ std::vector<ThreadsSpeed> measure_threads(const sim::WorldDefinition& world, con
             for (const std::vector<ThreadsSpeed>& round : all) values.push_back(round[i].*of);
             return median_of(std::move(values));
         };
-        medians.push_back({threads[i], median(&ThreadsSpeed::elapsed_s),
-                           median(&ThreadsSpeed::critical_path_s), median(&ThreadsSpeed::cpu_s)});
+        medians.push_back({threads[i], median(&ThreadsSpeed::elapsed_s), median(&ThreadsSpeed::cpu_s)});
     }
     return medians;
 }

@@ -143,10 +143,9 @@ Throughput through_application(const ThroughputSettings& settings, const sim::Wo
     zmq::context_t here, there;
     zmq::socket_t sender = sim::connect_worker(here, gate.endpoint(), one, 0);
     zmq::socket_t receiver = sim::connect_worker(there, gate.endpoint(), other, 0);
-    (void)receiver.send(zmq::buffer(sim::encode({}, sim::JoinRequest{0, {kReceiver}, ""})),
+    (void)receiver.send(zmq::buffer(sim::encode({}, sim::JoinRequest{{kReceiver}, ""})),
                         zmq::send_flags::none);
-    (void)sender.send(zmq::buffer(sim::encode({}, sim::JoinRequest{0, {kSender}, ""})),
-                      zmq::send_flags::none);
+    (void)sender.send(zmq::buffer(sim::encode({}, sim::JoinRequest{{kSender}, ""})), zmq::send_flags::none);
     Shared shared;
     const std::jthread passes([&] { pass_on(gate, shared); });
     std::this_thread::sleep_for(200ms);  // both are members

@@ -26,13 +26,10 @@ Words operator+(Words a, const Words& b) {
 
 /// What a run wrote, without what it measured.
 std::map<std::string, std::string> products_of(const fs::path& out) {
-    std::map<std::string, std::string> files = read_tree(out, {"times.csv", "timing.csv", "workers.svg"});
+    std::map<std::string, std::string> files = read_tree(out, {"times.csv"});
     std::erase_if(files, [](const auto& file) { return file.first.starts_with(".unfinished/"); });
     json summary = json::parse(files.at("summary.json"));
     for (const char* measured : {"elapsed_s", "cpu_s", "ns_per_body_step", "wall_s"}) summary.erase(measured);
-    std::vector<std::string> notes = summary["notes"];
-    std::ranges::sort(notes);  // workers join in any order
-    summary["notes"] = notes;
     files["summary.json"] = summary.dump(1);
     return files;
 }
@@ -43,16 +40,14 @@ fs::path checkpoint_of(const fs::path& out) {
 
 /// Kills the run several times, soon after it has begun or gone on from a checkpoint, then lets it end.
 /// Returns how often it was gone on with.
-int run_among_kills(const Words& command, const fs::path& out, const Words& to_resume, int kills,
-                    unsigned seed) {
+int run_among_kills(const Words& command, const fs::path& out, int kills, unsigned seed) {
     std::mt19937 random(seed);
     const Folder streams;
     int resumed = 0;
     for (int kill = 0; !fs::exists(out / "summary.json"); ++kill) {
         const bool goes_on = fs::exists(checkpoint_of(out));
         resumed += goes_on;
-        Started started(goes_on ? Words{"simulate", "--resume", out.string()} + to_resume : command,
-                        streams / "");
+        Started started(goes_on ? Words{"simulate", "--resume", out.string()} : command, streams / "");
         if (kill < kills) {
             // Until there is something to go on from, or less.
             for (int i = 0; i < 12000 && !fs::exists(checkpoint_of(out)) && kill % 4 != 3; ++i)
@@ -79,42 +74,12 @@ TEST(Resume, ARunThatIsKilledAtAnyMomentGoesOnToTheSameFilesAndPictures) {
     for (const unsigned seed : {1u, 2u, 3u}) {
         const fs::path out = folder / ("killed" + std::to_string(seed));
         resumed += run_among_kills(command + Words{"--out", out, "--checkpoint", seed == 1 ? "1" : "11"}, out,
-                                   {}, 6, seed);
+                                   6, seed);
         ASSERT_FALSE(HasFailure());
         EXPECT_EQ(products_of(out), whole);
         EXPECT_FALSE(fs::exists(out / ".unfinished"));
     }
     EXPECT_GE(resumed, 3);
-}
-
-TEST(Resume, TwoWorkersInLockstepGoOnToTheSameFilesAlsoAsThree) {
-    const Folder folder;
-    const Words command = {"simulate", "benchmark25", "--workers", "2", "--balance", "off", "--steps", "80"};
-    ASSERT_EQ(run(command + Words{"--out", folder / "whole"}).status, 0);
-    const auto whole = products_of(folder / "whole");
-    for (const Words& to_resume : {Words{}, Words{"--workers", "3"}}) {
-        const fs::path out = folder / ("killed" + std::to_string(to_resume.size()));
-        const int resumed =
-            run_among_kills(command + Words{"--out", out, "--checkpoint", "5"}, out, to_resume, 3, 7);
-        ASSERT_FALSE(HasFailure());
-        EXPECT_GT(resumed, 0);
-        auto products = products_of(out);
-        if (!to_resume.empty()) {
-            const json summary = json::parse(products.at("summary.json")),
-                       as_two = json::parse(whole.at("summary.json"));
-            EXPECT_EQ(summary["state_hash"], as_two["state_hash"]);
-            EXPECT_EQ(summary["workers"], 3);
-            products["summary.json"] = whole.at("summary.json");
-        }
-        // What workers told each other is counted, too: the first step after a start each does alone.
-        auto expected = whole;
-        for (auto* of : {&products, &expected}) {
-            json summary = json::parse(of->at("summary.json"));
-            EXPECT_EQ(summary.erase("bytes_per_body_step") + summary.erase("linked_bytes_per_body_step"), 2u);
-            (*of)["summary.json"] = summary.dump();
-        }
-        EXPECT_EQ(products, expected);
-    }
 }
 
 /// A folder with a run that was killed after it had saved a checkpoint, or more.
@@ -146,7 +111,7 @@ TEST(Resume, AnotherSceneOtherOptionsOrADamagedFileAreRefusedWithTheirPlace) {
     refused({"--steps", "20"}, "--steps=20");
     refused({"human"}, "human");
     refused({"--dt", "1/50"}, "--dt=1/50");
-    refused({"--workers", "2"}, "workers");
+    refused({"--workers", "2"}, "--workers=2");
     write(scene, text + "# changed\n");
     refused({}, "SHA-256");
     write(scene, text);
@@ -168,9 +133,8 @@ TEST(Resume, AnotherSceneOtherOptionsOrADamagedFileAreRefusedWithTheirPlace) {
     expect_refused(run({"simulate", "--resume", out}), "no such file");
     EXPECT_FALSE(fs::exists(out));
     expect_refused(run({"simulate", "human", "--checkpoint", "5"}), "--out");
-    expect_refused(
-        run({"simulate", "human", "--checkpoint", "5", "--out", out, "--workers", "2", "--mode", "async"}),
-        "--mode async");
+    expect_refused(run({"simulate", "human", "--checkpoint", "5", "--out", out, "--workers", "2"}),
+                   "--workers 0");
     expect_refused(run({"simulate"}), "SCENE");
 }
 

@@ -21,8 +21,7 @@ public:
     }
 
     explicit OtherHost(int number)
-        : number_(number),
-          name_("mw" + std::to_string(getpid()) + "n" + std::to_string(number)),
+        : name_("mw" + std::to_string(getpid()) + "n" + std::to_string(number)),
           net_("10." + std::to_string(200 + getpid() % 50) + "." + std::to_string(number) + ".") {
         const bool made = run("ip netns add " + name_) &&
                           run("ip link add " + cable() + " type veth peer name eth0 netns " + name_) &&
@@ -41,21 +40,6 @@ public:
 
     [[nodiscard]] std::string here() const { return net_ + "1"; }  ///< this machine's address for it
     void cut() const { run("ip link set " + cable() + " down"); }
-    /// A cable between two such hosts, by which they reach each other at the addresses that this machine knows.
-    void connect(const OtherHost& other) const {
-        const std::string to = "to" + std::to_string(other.number_), back = "to" + std::to_string(number_);
-        const bool made = run("ip link add " + to + " netns " + name_ + " type veth peer name " + back +
-                              " netns " + other.name_) &&
-                          run("ip -n " + name_ + " link set " + to + " up") &&
-                          run("ip -n " + other.name_ + " link set " + back + " up") &&
-                          run("ip -n " + name_ + " route add " + other.net_ + "2/32 dev " + to) &&
-                          run("ip -n " + other.name_ + " route add " + net_ + "2/32 dev " + back);
-        if (!made) throw std::runtime_error("no cable between network namespaces");
-    }
-    void cut_from(const OtherHost& other) const {
-        run("ip -n " + name_ + " link set to" + std::to_string(other.number_) + " down");
-    }
-
     /// The same program, there.
     [[nodiscard]] sim::WorkerLaunch there(const sim::WorkerLaunch& launch) const {
         sim::WorkerLaunch other = {"/usr/bin/env", {"ip", "netns", "exec", name_, launch.program}, 1};
@@ -72,7 +56,6 @@ private:
     static bool run(const std::string& command) {
         return std::system((command + " >/dev/null 2>&1").c_str()) == 0;  // NOLINT(cert-env33-c)
     }
-    const int number_;
     const std::string name_, net_;
 };
 

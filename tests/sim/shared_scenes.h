@@ -62,8 +62,7 @@ inline sim::World alone(const sim::WorldScene& scene, std::uint64_t steps,
     return world;
 }
 
-/// So many steps in lockstep.
-inline sim::DistributedSettings lockstep(std::uint64_t steps) {
+inline sim::DistributedSettings for_steps(std::uint64_t steps) {
     sim::DistributedSettings settings;
     settings.steps = steps;
     return settings;

@@ -23,15 +23,14 @@ namespace fs = std::filesystem;
 
 void print_workers(const SimulateResult& r) {
     const WorkerOptions& o = *r.worker_options;
-    fmt::print("{}, {}, {}: {:.1f} bytes per body and step, {} between workers, {} traded\n",
-               counted(r.workers, o.simulated ? "simulated processor" : "worker"), mode_name(o.pace),
-               o.pace == sim::Pace::bounded ? fmt::format("bound {}", o.bound) : "lockstep",
+    fmt::print("{}, bound {}: {:.1f} bytes per body and step, {} between workers, {} traded\n",
+               counted(r.workers, o.simulated ? "simulated processor" : "worker"), o.bound,
                r.body_steps > 0 ? double(r.bytes) / double(r.body_steps) : 0.0,
                counted(r.cross_contacts, "contact"), counted(r.migrations, "body"));
     if (r.one_owner && r.workers > 1)
         fmt::print(
-            "one worker stepped all bodies: they differ too much in mass or length to be shared out of step; "
-            "--mode sync shares them\n");
+            "one worker stepped all bodies: they differ too much in mass or length to be shared out; "
+            "--workers 0 --threads N shares out each step\n");
     if (r.lost + r.left > 0)
         fmt::print("{} lost, {} left early; {} went to others\n", counted(r.lost, "worker"), r.left,
                    counted(r.bodies_reowned, "body"));
@@ -74,12 +73,12 @@ void simulate_and_print(const SimulateOptions& options, bool json, bool allow_qu
         result.worker_options
             ? "bodies"
             : fmt::format("{} of {}", result.bodies - result.counts.asleep, counted(result.bodies, "body"));
-    const bool apart = result.worker_options && result.worker_options->pace == sim::Pace::bounded;
     throw std::runtime_error(fmt::format(
         "{}: error: found {} awake after {} (or events to come), expected rest; {}", result.scene.string(),
         awake, counted(result.steps, "step"),
-        apart ? "what bodies of several workers hold does not come to rest with --mode async: use --mode sync"
-              : "allow more --steps, or damp what swings and spins (damping_alpha)"));
+        result.worker_options
+            ? "what bodies of several workers hold does not come to rest: use --workers 0 --threads N"
+            : "allow more --steps, or damp what swings and spins (damping_alpha)"));
 }
 
 struct Options : SimulateOptions {
@@ -129,8 +128,7 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     command.option(
         "--threads", o->threads, as::whole(1, kMostThreads),
         "Threads that share out each step; default: one a processor core, 8 at most. With --workers those of "
-        "each that is started here, see `worker`; default 1. No bit depends on how many, except with --mode "
-        "async");
+        "each that is started here, see `worker`; default 1. No bit of one process depends on how many");
     add_worker_options(command, o->workers);
     command.flag(
         "--allow-quarantine", o->allow_quarantine,
@@ -141,9 +139,8 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
 
 /// Of a run that goes on: how it is done and told may be another than it was, what comes out may not.
 bool may_change(const std::string& name) {
-    constexpr std::array<std::string_view, 10> kHow = {
-        "--checkpoint", "--threads", "--workers", "--balance", "--listen",
-        "--keys",       "--expect",  "--verify",  "--json",    "--allow-quarantine"};
+    constexpr std::array<std::string_view, 4> kHow = {"--checkpoint", "--threads", "--json",
+                                                      "--allow-quarantine"};
     return std::ranges::count(kHow, name) > 0;
 }
 
@@ -191,10 +188,6 @@ Options resumed(const Options& given, const Command& command) {
         throw BadInput(fmt::format("{}: error: found {}, expected options of simulate; begin the run anew",
                                    file.string(), one_line(wrong.what())));
     }
-    if (static_cast<bool>(o->workers) != saved.has_workers)
-        throw BadInput(fmt::format(
-            "{}: error: found a run {} workers, expected one {} them: their tables differ", file.string(),
-            saved.has_workers ? "with" : "without", saved.has_workers ? "without" : "with"));
     o->words = words;
     o->out = out;
     o->goes_on = true;

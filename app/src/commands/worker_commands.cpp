@@ -70,10 +70,8 @@ void add_worker_command(Command& program) {
     command.required("--connect", o->endpoint, as::text("ENDPOINT"),
                      "ZeroMQ endpoint of the application: tcp://ADDRESS:PORT");
     command.option("--key", o->key, as::text("FILE"), "This worker's key, made by `musicworld keys`");
-    command.option(
-        "--threads", o->threads, as::whole(1, kMostThreads),
-        "Threads that share out the steps of a simulation that it does by itself: all with --mode async, "
-        "with --mode sync those done alone");
+    command.option("--threads", o->threads, as::whole(1, kMostThreads),
+                   "Threads that share out each of its steps of a simulation");
     command.runs([o] { throw ExitStatus{sim::run_worker(o->endpoint, o->key, o->threads)}; });
 }
 

@@ -8,12 +8,11 @@
 namespace app {
 namespace {
 
-constexpr int kMostWorkers = 256, kMostBound = 64, kUsualBound = 4;
+constexpr int kMostWorkers = 256, kMostBound = 64;
 
 /// What WorkerOptions are made of.
 struct TypedWorkers {
     WorkerOptions options;
-    bool async = false;
     std::optional<int> bound;
 };
 
@@ -21,23 +20,13 @@ struct TypedWorkers {
 void check_together(const TypedWorkers& typed) {
     const WorkerOptions& o = typed.options;
     const bool alone = o.count == 0 && o.listen.empty();
-    const int bound = typed.bound.value_or(0);
     if (alone && o.simulated)
         refuse_options("--processors without --workers", "how many of them, such as --workers 10");
-    if (alone && (typed.async || bound != 0))
-        refuse_options(typed.async ? "--mode async" : fmt::format("--bound {}", bound),
+    if (alone && typed.bound)
+        refuse_options(fmt::format("--bound {}", *typed.bound),
                        "--workers N with it: without workers a scene runs in this process");
-    if (!typed.async && bound != 0)
-        refuse_options(fmt::format("--bound {} with --mode sync", bound), "--mode async, or no --bound");
     if (o.simulated && !o.listen.empty())
         refuse_options("--listen with --processors", "one of them: simulated processors are in this process");
-    if (o.verify > 1 && (typed.async || o.simulated))
-        refuse_options(
-            fmt::format("--verify {} with {}", o.verify, typed.async ? "--mode async" : "--processors"),
-            "--mode sync and processes: only what is to the bit can be compared");
-    if (o.verify > std::max({o.count, o.expect, 1}))
-        refuse_options(fmt::format("--verify {}", o.verify),
-                       "at least as many --workers, or more to --expect: they check each other");
     if (o.listen.empty() && (!o.keys.empty() || o.expect > 0))
         refuse_options(!o.keys.empty() ? "--keys" : "--expect",
                        "--listen ENDPOINT with it, where workers of other hosts come in");
@@ -50,8 +39,7 @@ std::optional<WorkerOptions> worker_options_of(const TypedWorkers& typed) {
     check_together(typed);
     WorkerOptions o = typed.options;
     if (o.count == 0 && o.listen.empty()) return {};
-    o.bound = typed.bound.value_or(typed.async ? kUsualBound : 0);
-    o.pace = o.bound > 0 ? sim::Pace::bounded : sim::Pace::lockstep;  // bound 0 is lockstep
+    o.bound = typed.bound.value_or(o.bound);
     if (o.simulated) o.simulated->count = o.count;
     return o;
 }
@@ -95,10 +83,8 @@ void add_worker_options(Command& command, std::optional<WorkerOptions>& options)
     WorkerOptions& o = typed->options;
     command.option("--workers", o.count, as::whole(0, kMostWorkers),
                    "Worker processes to start here; 0 without --listen: all in this process");
-    command.option("--mode", typed->async, as::choice<bool>({{"sync", false}, {"async", true}}),
-                   "sync: in lockstep, to the bit as in one process; async: boundedly out of step");
     command.option("--bound", typed->bound, as::whole(0, kMostBound, "steps"),
-                   "async: how far a worker may be ahead of the slowest, default 4; 0 is lockstep");
+                   "How far a worker may be ahead of the slowest, default 4; 0: a barrier after each step");
     command.option("--balance", o.balance, as::choice<bool>({{"on", true}, {"off", false}}),
                    "on: workers trade columns of bodies to be equally fast");
     command.option("--listen", o.listen, as::text("ENDPOINT"),
@@ -107,9 +93,6 @@ void add_worker_options(Command& command, std::optional<WorkerOptions>& options)
                    "Folder made by `musicworld keys`; needed beyond this host");
     command.option("--expect", o.expect, as::whole(0, kMostWorkers),
                    "Workers to wait for before the first step");
-    command.option(
-        "--verify", o.verify, as::whole(1, kMostWorkers),
-        "sync: so many workers compute the same bodies, and one that differs from most is given up");
     command.option(
         "--processors", o.simulated, as::processors(),
         "simulated[:latency=S,slowdown=X,cost=measured|modelled]: workers in this process, each with "

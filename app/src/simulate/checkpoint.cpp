@@ -5,7 +5,6 @@
 
 #include <bit>
 #include <cstring>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -20,15 +19,15 @@ using nlohmann::json;
 
 //   offset  bytes  little-endian
 //   0       8      "MWCHECK\n"
-//   8       4      version, 1
+//   8       4      version, 2
 //   12      4      length of what comes next
 //   16      8      length of what comes then
-//   24      ...    JSON: all but the state; names of files and notes as lists of bytes, doubles as their 64 bits
+//   24      ...    JSON: all but the state; words and names of files as lists of bytes, doubles as their 64 bits
 //   ...     ...    the state of the world (sim/src/shared/run_state.cpp)
 //   end-8   8      FNV-1a 64 of everything before
 
 constexpr std::string_view kMagic = "MWCHECK\n";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kVersionAt = 8, kHeaderBytes = 24, kChecksumBytes = 8;
 
 static_assert(std::endian::native == std::endian::little, "numbers are copied as they lie in memory");
@@ -80,25 +79,6 @@ std::vector<std::string> texts_of(const json& list) {
     return texts;
 }
 
-json json_of(const WorkerHistory& history) {
-    json workers = json::array();
-    for (const auto& [worker, points] : history.workers()) {
-        json rows = json::array();
-        for (const WorkerHistory::Point& p : points) rows.push_back({p.step, p.bodies, bits_of(p.seconds)});
-        workers.push_back({worker, rows});
-    }
-    return {history.every(), workers};
-}
-
-WorkerHistory history_of(const json& saved) {
-    std::map<int, std::vector<WorkerHistory::Point>> workers;
-    for (const json& worker : saved.at(1))
-        for (const json& row : worker.at(1))
-            workers[worker.at(0).get<int>()].push_back(
-                {row.at(0).get<std::uint64_t>(), row.at(1).get<int>(), double_of(row.at(2))});
-    return {saved.at(0).get<std::uint64_t>(), std::move(workers)};
-}
-
 json json_of(const Checkpoint& c) {
     const RecordState& r = c.record;
     const MomentumWatch::Largest& m = r.momentum;
@@ -107,14 +87,11 @@ json json_of(const Checkpoint& c) {
             {"version", c.version},
             {"build", c.build},
             {"scene_sha256", c.scene_sha256},
-            {"has_workers", c.has_workers},
             {"table_bytes", r.table_bytes},
             {"next_frame", r.next_frame},
             {"body_steps", r.body_steps},
             {"momentum", {bits_of(m.linear), bits_of(m.angular), bits_of(m.scale)}},
             {"spun", r.spun},
-            {"notes", list_of(r.notes)},
-            {"history", json_of(r.history)},
             {"wall_s", bits_of(r.wall_s)}};
 }
 
@@ -124,7 +101,6 @@ void read(const json& saved, Checkpoint& c) {
     saved.at("version").get_to(c.version);
     saved.at("build").get_to(c.build);
     saved.at("scene_sha256").get_to(c.scene_sha256);
-    saved.at("has_workers").get_to(c.has_workers);
     RecordState& r = c.record;
     saved.at("table_bytes").get_to(r.table_bytes);
     saved.at("next_frame").get_to(r.next_frame);
@@ -132,8 +108,6 @@ void read(const json& saved, Checkpoint& c) {
     const json& momentum = saved.at("momentum");
     r.momentum = {double_of(momentum.at(0)), double_of(momentum.at(1)), double_of(momentum.at(2))};
     saved.at("spun").get_to(r.spun);
-    r.notes = texts_of(saved.at("notes"));
-    r.history = history_of(saved.at("history"));
     r.wall_s = double_of(saved.at("wall_s"));
 }
 

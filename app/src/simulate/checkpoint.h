@@ -12,12 +12,10 @@ namespace app {
 
 /// How far the outputs of a run are, and what they will say of the steps that have been done.
 struct RecordState {
-    std::array<std::uint64_t, 3> table_bytes{};  ///< of states.csv, energy.csv, and times.csv or timing.csv
+    std::array<std::uint64_t, 3> table_bytes{};  ///< of states.csv, energy.csv, times.csv
     std::uint64_t next_frame = 0, body_steps = 0;
     MomentumWatch::Largest momentum;
     std::vector<std::pair<int, std::uint64_t>> spun;  ///< bodies, and the step that was told
-    std::vector<std::string> notes;
-    WorkerHistory history;
     double wall_s = 0;
 };
 
@@ -27,7 +25,6 @@ struct Checkpoint {
     std::filesystem::path directory;  ///< in which names of files begin there
     std::string version, build;       ///< of the program
     std::string scene_sha256;         ///< of the scene's file
-    bool has_workers = false;
     RecordState record;
     std::vector<std::uint8_t> state;  ///< sim::encode(RunState)
 };

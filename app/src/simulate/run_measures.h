@@ -1,7 +1,6 @@
 #pragma once
 #include <sim/distributed_world.h>
 
-#include <algorithm>
 #include <map>
 #include <optional>
 #include <utility>
@@ -16,7 +15,7 @@ namespace app {
 /// acts, else at the end with what the world counted (World::outside_impulse).
 class MomentumWatch {
 public:
-    /// rounded: states are, but the last (bounded pace), so that only those count.
+    /// rounded: states are, but the last (those of workers), so that only those count.
     MomentumWatch(const sim::WorldScene& scene, const sim::World& world, bool rounded);
     void look(const sim::World& world);  ///< now and then, and at the end
     /// `outside`: the impulse since the start, if it is known. None: unknown.
@@ -48,19 +47,13 @@ public:
         double seconds;
     };
 
-    WorkerHistory() = default;
-    WorkerHistory(std::uint64_t every, std::map<int, std::vector<Point>> workers)
-        : workers_(std::move(workers)), every_(std::max<std::uint64_t>(every, 1)) {}
-
     void add(const sim::WorkerStep& step);
-    /// Steps that are kept are multiples of it.
-    [[nodiscard]] std::uint64_t every() const { return every_; }
     /// By worker, in order of steps.
     [[nodiscard]] const std::map<int, std::vector<Point>>& workers() const { return workers_; }
 
 private:
     std::map<int, std::vector<Point>> workers_;
-    std::uint64_t every_ = 1;
+    std::uint64_t every_ = 1;  // steps that are kept are multiples of it
 };
 
 /// Bodies of each worker and its seconds per step over the steps (figures 2-6 and 2-7 of the thesis).

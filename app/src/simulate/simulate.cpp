@@ -45,7 +45,6 @@ sim::DistributedSettings settings_of(const SimulateOptions& options, const Scene
     settings.all_to_first = scene.workers.all_to_first;
     settings.market.from_step = scene.workers.balance_from;
     if (!options.workers) return settings;
-    settings.pace = options.workers->pace;
     settings.bound = options.workers->bound;
     settings.market.trade = options.workers->balance;
     return settings;
@@ -74,7 +73,6 @@ sim::DistributedLaunch launch_of(const WorkerOptions& workers, int threads) {
                         workers.count};
     launch.listen = workers.listen;
     launch.expect = workers.expect;
-    launch.verify = workers.verify;
     launch.keys = workers.keys;
     if (!workers.listen.empty())
         launch.listening = [keys = workers.keys](const std::string& endpoint) {
@@ -92,7 +90,7 @@ sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
     if (options.workers->simulated)
         return sim::simulate_processors(scene, settings, *options.workers->simulated, observer);
     return sim::run_distributed(scene, settings, launch_of(*options.workers, options.threads.value_or(1)),
-                                observer, from);
+                                observer);
 }
 
 /// Changes what is left to a scene's accuracy.
@@ -126,12 +124,10 @@ void check(const SimulateOptions& options, const Scene& scene) {
         throw BadInput("error: found --frames or --video without --out, expected a folder for the pictures");
     if (options.checkpoint > 0 && !options.out)
         throw BadInput("error: found --checkpoint without --out, expected a folder to save it in");
-    if (options.checkpoint > 0 && options.workers &&
-        (options.workers->pace == sim::Pace::bounded || options.workers->simulated))
+    if ((options.checkpoint > 0 || options.goes_on) && options.workers)
         throw BadInput(
-            "error: found --checkpoint with --mode async or --processors, expected --mode sync and "
-            "processes: what "
-            "depends on who was faster cannot go on as it was");
+            "error: found --checkpoint with workers, expected --workers 0: what depends on who was faster "
+            "cannot go on as it was");
     if (options.video) {
         const OutputFile can_be(*options.video);
         if (options.width % 2 != 0 || options.height % 2 != 0)
@@ -149,7 +145,6 @@ Checkpoint about(const SimulateOptions& options, const Scene& scene) {
             MUSICWORLD_VERSION,
             program_build(),
             sha256_of_file(scene.file),
-            options.workers.has_value(),
             {},
             {}};
 }
@@ -255,15 +250,12 @@ std::string clock_of(const WorkerOptions& options) {
 Json workers_of(const SimulateResult& r) {
     return {{"clock", clock_of(*r.worker_options)},
             {"balance", r.worker_options->balance},
-            {"verify", r.worker_options->verify},
             {"workers_lost", r.lost},
             {"workers_left", r.left},
             {"bodies_reowned", r.bodies_reowned},
             {"trades", r.trades},
             {"one_owner", r.one_owner},
             {"bytes_per_body_step", r.body_steps > 0 ? Json(double(r.bytes) / double(r.body_steps)) : Json()},
-            {"linked_bytes_per_body_step",
-             r.body_steps > 0 ? Json(double(r.bytes_linked) / double(r.body_steps)) : Json()},
             {"largest_lead", r.largest_lead},
             {"largest_ghost_age", r.largest_ghost_age},
             {"refused_messages", r.refused_messages}};
@@ -303,15 +295,13 @@ SimulateResult simulate(const SimulateOptions& options) {
 }
 
 std::string format_simulate(const SimulateResult& r) {
-    const WorkerOptions options = r.worker_options.value_or(WorkerOptions{});
     Json json = {
         {"scene", r.scene.string()},
         {"bodies", r.bodies},
         {"steps", r.steps},
         {"dt_s", r.dt_s},
         {"workers", r.workers},
-        {"mode", mode_name(options.pace)},
-        {"bound", options.bound},
+        {"bound", r.worker_options ? r.worker_options->bound : 0},
         {"elapsed_s", r.elapsed_s},
         {"cpu_s", r.cpu_s},
         {"ns_per_body_step", r.body_steps > 0 ? Json(1e9 * r.elapsed_s / double(r.body_steps)) : Json()},

@@ -16,20 +16,13 @@ namespace app {
 /// How a scene is shared out to workers.
 struct WorkerOptions {
     int count = 0;  ///< processes started here, or simulated processors
-    sim::Pace pace = sim::Pace::lockstep;
-    int bound = 0;  ///< [steps]
+    int bound = 4;  ///< [steps]
     bool balance = true;
     std::string listen;  ///< endpoint; empty: in a private folder
     std::filesystem::path keys;
     int expect = 0;                                     ///< workers before the first step
-    int verify = 1;                                     ///< that compute the same bodies
     std::optional<sim::SimulatedProcessors> simulated;  ///< instead of processes
 };
-
-/// "sync" or "async".
-[[nodiscard]] inline std::string mode_name(sim::Pace pace) {
-    return pace == sim::Pace::lockstep ? "sync" : "async";
-}
 
 struct SimulateOptions {
     std::filesystem::path scene;
@@ -55,7 +48,7 @@ struct SimulateOptions {
 
 /// Momentum that came from nowhere.
 struct MomentumDrift {
-    double linear = 0;  ///< largest seen; at the end where more than gravity acted, or out of step [kg m/s]
+    double linear = 0;  ///< largest seen; at the end where more than gravity acted, or of workers [kg m/s]
     std::optional<double> angular;  ///< largest seen [kg m^2/s]; known where nothing at all acted
     double scale = 0;               ///< largest sum of |m v| over the bodies [kg m/s]
 

@@ -79,9 +79,7 @@ void SimulateRecord::done(std::uint64_t step, const std::function<sim::RunState(
         Checkpoint now = run_;
         now.record = save_record();
         std::ranges::copy(tables, now.record.table_bytes.begin());
-        sim::RunState reached = state();
-        if (options_.workers) reached.result.elapsed_s += since_start_.seconds();
-        now.state = sim::encode(reached);
+        now.state = sim::encode(state());
         write_finished_file(folder_->scratch() / "checkpoint", format_checkpoint(now));
         folder_->keep();
         failing_ = false;
@@ -147,7 +145,6 @@ void SimulateRecord::worked(const sim::WorkerStep& s) {
 }
 
 void SimulateRecord::note(const std::string& what) {
-    if (from_ && std::ranges::count(result_.notes, what) > 0) return;
     result_.notes.push_back(what);
     const bool is_usual =
         !options_.workers || (options_.workers->listen.empty() && what.find(" joins") != std::string::npos);
@@ -168,7 +165,7 @@ SimulateResult SimulateRecord::finish(const sim::DistributedResult& run, const W
 }
 
 void SimulateRecord::start(const sim::World& world) {
-    momentum_.emplace(scene_, world, options_.workers && options_.workers->pace == sim::Pace::bounded);
+    momentum_.emplace(scene_, world, options_.workers.has_value());
     result_.energy_start = world.energy();
     if (from_) go_on();
     if (!folder_) return;
@@ -192,9 +189,7 @@ void SimulateRecord::start(const sim::World& world) {
 void SimulateRecord::go_on() {
     next_frame_ = saved_frames_ = from_->next_frame;
     result_.body_steps = from_->body_steps;
-    result_.notes = from_->notes;
     momentum_->go_on(from_->momentum);
-    history_ = from_->history;
     spun_.resize(scene_.looks.size());
     for (const auto& [body, step] : from_->spun) {
         if (body < 0 || std::size_t(body) >= spun_.size())
@@ -232,8 +227,6 @@ RecordState SimulateRecord::save_record() {
     r.body_steps = result_.body_steps;
     r.momentum = momentum_->largest();
     r.spun = told_spun_;
-    r.notes = result_.notes;
-    r.history = history_;
     r.wall_s = (from_ ? from_->wall_s : 0) + since_start_.seconds();
     return r;
 }

@@ -38,7 +38,6 @@ public:
 
     void worked(const sim::WorkerStep& s) override;
 
-    /// Once where a run goes on: workers join again.
     void note(const std::string& what) override;
 
     /// After the last step; `wall`: since the scene was read.

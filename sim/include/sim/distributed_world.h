@@ -1,7 +1,6 @@
 #pragma once
 #include <filesystem>
 #include <functional>
-#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,8 +11,9 @@
 namespace sim {
 
 // One world simulated by several workers (thesis 2.1, 2.3, 2.4). Every worker is a process that knows the
-// whole scene and owns some of its bodies. The application is the coordinator: it keeps the members and the
-// owners of bodies, and relays messages. SI units, world frame, y up.
+// whole scene and owns some of its bodies. It goes on as fast as it can, but no more than a bound of steps ahead
+// of the slowest. The application is the coordinator: it keeps the members and the owners of bodies, and relays
+// messages. SI units, world frame, y up.
 
 /// From a step on, worker `worker` takes `factor` times as long per step; 1 ends that.
 struct Slowing {
@@ -37,11 +37,6 @@ struct WorldScene {
     std::vector<WorldEvent> events;  ///< by ascending steps
 };
 
-enum class Pace {
-    lockstep,  ///< to the bit as in one process
-    bounded    ///< each worker as fast as it can, at most `bound` steps ahead of the slowest that owns a body
-};
-
 struct MarketSettings {  ///< of the load balancing, thesis 2.4
     bool trade = true;
     std::uint64_t from_step = 0;  ///< no offers before the seller's step
@@ -50,15 +45,14 @@ struct MarketSettings {  ///< of the load balancing, thesis 2.4
 };
 
 struct DistributedSettings {  ///< of a run; refused settings throw std::invalid_argument
-    Pace pace = Pace::lockstep;
-    int bound = 0;            ///< [steps]; also the greatest age of a ghost
+    /// So many steps may a worker be ahead of the slowest that owns a body, and so old may a ghost be; 0: a barrier
+    /// after each step.
+    int bound = 4;
     std::uint64_t steps = 0;  ///< at most
     bool until_rest =
         false;  ///< stop before when every body has been still for half a second and no event is left
     bool all_to_first =
         false;  ///< at first one worker owns every body; else each gets neighbours, in equal numbers
-    bool together =
-        true;  ///< lockstep: workers share out the contacts and large islands of a step; else each solves whole islands
     MarketSettings market;
 };
 
@@ -76,7 +70,7 @@ struct WorkerStep {
     int lead = 0;       ///< steps ahead of the slowest that owned a body, as this worker knew at the start
     int ghost_age = 0;  ///< of the oldest used [steps]
     std::uint64_t bytes = 0;  ///< sent for this step
-    int cross_contacts = 0;  ///< points between bodies of different owners that it resolved; bounded: both do
+    int cross_contacts = 0;   ///< points between bodies of different owners that it resolved; both owners do
 };
 
 struct DistributedResult {    ///< of a whole run
@@ -91,7 +85,6 @@ struct DistributedResult {    ///< of a whole run
     std::uint64_t cross_contacts = 0;  ///< points, summed over steps
     std::uint64_t bytes = 0,
                   bytes_states = 0;      ///< sent by workers, every copy; of them state or update records
-    std::uint64_t bytes_linked = 0;      ///< of them from worker to worker, not by way of the application
     std::uint64_t records = 0;           ///< state or update records sent
     std::uint64_t refused_messages = 0;  ///< malformed or stale ones
     int largest_lead = 0, largest_ghost_age = 0;                ///< [steps]
@@ -99,8 +92,7 @@ struct DistributedResult {    ///< of a whole run
     WorldCounts counts;                                         ///< summed over workers
     std::vector<QuarantinedBody> quarantined;                   ///< in order of steps; so are the next two
     std::vector<FirstStep> limited, broken;                     ///< see World::limited and World::broken
-    bool one_owner =
-        false;  ///< bounded: one worker stepped all bodies, which are too unlike to be shared out
+    bool one_owner = false;     ///< one worker stepped all bodies, which are too unlike to be shared out
     bool rest_reached = false;  ///< until_rest: every body came to rest
     /// SimulatedProcessors::repeat_alone: the workers' processor time in turns over that of the same work one worker
     /// after the other: elapsed_s, as far as it is work, is too long by this factor.
@@ -108,13 +100,11 @@ struct DistributedResult {    ///< of a whole run
     double busiest_s = 0;  ///< likewise: the time of the worker that then takes longest, by the run's clock
 };
 
-/// Where a run in lockstep or in one process is at the end of a step: all that its next steps and its result
-/// depend on, apart from its scene and settings.
+/// Where a run in one process is at the end of a step: all that its next steps and its result depend on, apart
+/// from its scene and settings.
 struct RunState {
-    WorldSnapshot world;       ///< without its outside impulse
+    WorldSnapshot world;
     DistributedResult result;  ///< so far
-    /// World::outside_impulse of each worker, by its number; in one process worker 0's.
-    std::map<std::uint32_t, Eigen::Vector3d> outside;
 };
 
 /// For a file; see run_state.cpp for the layout.
@@ -127,10 +117,10 @@ struct RunState {
 class DistributedObserver {
 public:
     virtual ~DistributedObserver() = default;
-    /// Before at(), from step 1 on, in lockstep and in one process: `state` gives what a run goes on from that begins with
-    /// at() of this step.
+    /// Before at(), from step 1 on, in one process: `state` gives what a run goes on from that begins with at() of
+    /// this step.
     virtual void done(std::uint64_t step, const std::function<RunState()>& state) { (void)step, (void)state; }
-    /// `world`: all bodies at the end of step `step` (0: the start), exact in lockstep, else as published.
+    /// `world`: all bodies at the end of step `step` (0: the start); of workers as published.
     virtual void at(std::uint64_t step, const World& world) { (void)step, (void)world; }
     /// After at(), perhaps more than once: `world` as the next step begins, with the events before it; after the last step as it ended.
     virtual void ready(std::uint64_t step, const World& world) { (void)step, (void)world; }
@@ -141,8 +131,8 @@ public:
     virtual void note(const std::string& what) { (void)what; }  ///< joins, losses, refusals, in words
 };
 
-/// Runs a scene in this process, without workers: pace, bound and market of `settings` do not count, nor does
-/// who is to be slower. elapsed_s and cpu_s are of the steps alone; each is told as worker 0's. `from`: goes on from
+/// Runs a scene in this process, without workers: bound and market of `settings` do not count, nor does who is
+/// to be slower. elapsed_s and cpu_s are of the steps alone; each is told as worker 0's. `from`: goes on from
 /// there, after at(0), to the same bits as without the interruption. So many `threads` share out each step
 /// (World::use_threads); cpu_s is of the calling one, which takes part in all. Throws InputError for a scene that is refused.
 DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& settings,
@@ -156,8 +146,6 @@ struct DistributedLaunch {
                          ///< for workers started elsewhere
     int expect = 0;      ///< wait for so many workers before the first step (at least processes.count)
     double wait_s = 60;  ///< for them; then the run begins without those that have not come
-    int verify =
-        1;  ///< lockstep: so many workers compute the same bodies and check each other; 1: nobody does
     double silence_s = 1;        ///< a worker silent for so long is lost
     double longest_step_s = 30;  ///< a worker for which all have waited for so long is given up
     std::filesystem::path keys;  ///< folder made by make_keys; needed unless ipc or loopback
@@ -166,20 +154,16 @@ struct DistributedLaunch {
 
 /// Runs a scene on worker processes over ZeroMQ. Returns when all steps are done. A lost worker's bodies go
 /// on elsewhere; if none is left, in this process. Throws InputError for a scene or setting that is
-/// refused, WorkerError if workers cannot be started, or none was and none joined. `from`, in lockstep: as run_alone.
+/// refused, WorkerError if workers cannot be started, or none was and none joined.
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
-                                  const DistributedLaunch& launch, DistributedObserver& observer,
-                                  const RunState* from = nullptr);
+                                  const DistributedLaunch& launch, DistributedObserver& observer);
 
 /// Simulated processors: workers in this process, each with a clock of its own that advances by the cost of
-/// its work, once it has the scene. Messages arrive `latency_s` after they were sent; events happen in the order
-/// of simulated time.
+/// its work, once it has the scene. Events happen in the order of simulated time.
 struct SimulatedProcessors {
     int count = 1;
-    double latency_s = 2e-4;  ///< from worker to worker
-    double by_application_s = 0,
-           directly_s =
-               0;  ///< so much longer: what the application sends, or passes on; what workers tell directly
+    double latency_s =
+        2e-4;  ///< from worker to worker, by way of the application: half of it to there, half from there
     double slowdown = 1;  ///< simulated seconds per second of what steps cost, measured or modelled
     bool modelled =
         false;  ///< costs are counted (World::work), not measured: results are a pure function of the input
@@ -204,7 +188,7 @@ DistributedResult simulate_processors(const WorldScene& scene, const Distributed
                                       const SimulatedProcessors& processors, DistributedObserver& observer);
 
 /// Hash of a libm probe, the processor's features in use, the compiler, the protocol's version and a small
-/// world's state after some steps. Hosts with equal fingerprints get equal bits in lockstep.
+/// world's state after some steps. Hosts with equal fingerprints get equal bits of one process.
 [[nodiscard]] std::uint64_t step_fingerprint();
 
 /// Writes CURVE keys into a new folder (0700): application.key (secret, 0600), application.pub, and for each
@@ -214,9 +198,8 @@ DistributedResult simulate_processors(const WorldScene& scene, const Distributed
 void make_keys(const std::filesystem::path& folder, const std::vector<std::string>& workers);
 
 /// A worker's process: joins the application at `endpoint`, of a world or of a kit, and serves until the run
-/// ends. SIGTERM or SIGINT: hands its bodies over and leaves. `key`: file made by make_keys, empty: none. `threads` share out
-/// the steps of a world that it does by itself, as World::use_threads: all out of step, in lockstep those done alone.
-/// Returns the exit status. Throws InputError for an endpoint or key that is refused, WorkerError
+/// ends. SIGTERM or SIGINT: hands its bodies over and leaves. `key`: file made by make_keys, empty: none. `threads`
+/// share out the steps of a world (World::use_threads). Returns the exit status. Throws InputError for an endpoint or key that is refused, WorkerError
 /// if nobody answers.
 [[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key, int threads = 1);
 

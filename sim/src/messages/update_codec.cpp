@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint8_t kUpdateAsleep = 1, kUpdateStill = 2, kUpdateQuarantined = 4, kUpdateHeld = 8;
 constexpr std::size_t kSmallestUpdate = 36, kCrossed = 33, kUsualUpdate = 98;
-constexpr std::uint32_t kBlow = 1U << 31;
+constexpr std::uint32_t kRebound = 1U << 31;
 constexpr std::int16_t kUpdateBroken = std::numeric_limits<std::int16_t>::min();
 
 /// Room for one update: what ByteWriter does, without growing by each number.
@@ -285,7 +285,7 @@ void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed) {
     out.bytes().reserve(out.bytes().size() + crossed.size() * kCrossed);
     for (const CrossImpulse& c : crossed) {
         const SharedExponent own = quantised(c.angular_own), ghost = quantised(c.angular_ghost);
-        out.number(static_cast<std::uint32_t>(c.own) | (c.blow ? kBlow : 0));
+        out.number(static_cast<std::uint32_t>(c.own) | (c.rebound ? kRebound : 0));
         out.number(static_cast<std::uint32_t>(c.ghost));
         out.number(static_cast<std::uint8_t>(own.exponent | ghost.exponent << 4));
         write_floats(out, c.linear);
@@ -303,11 +303,11 @@ std::vector<CrossImpulse> read_crossed(ByteReader& all) {
     std::vector<CrossImpulse> crossed(all.count(kCrossed));
     SmallReader in(all.take(kCrossed * crossed.size()));
     for (CrossImpulse& c : crossed) {
-        const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(), body = own & ~kBlow;
+        const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(), body = own & ~kRebound;
         const auto exponents = in.number<std::uint8_t>();
         if (body >= kMostWorldBodies || ghost >= kMostWorldBodies || body == ghost)
             throw DecodeError("an impulse between bodies that is none");
-        c.own = static_cast<int>(body), c.ghost = static_cast<int>(ghost), c.blow = (own & kBlow) != 0;
+        c.own = static_cast<int>(body), c.ghost = static_cast<int>(ghost), c.rebound = (own & kRebound) != 0;
         read_floats(in, c.linear);
         const bool whole = read_angular(in, exponents & 15, c.angular_own) &&
                            read_angular(in, exponents >> 4, c.angular_ghost);

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "messages/crc32c.h"
 #include "messages/struck_codec.h"
 #include "messages/update_codec.h"
 #include "messages/world_record_codec.h"
@@ -14,19 +13,16 @@ namespace sim {
 namespace {
 
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
-constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kChecksumBytes = 4, kFoundBytes = 12,
-                      kPlaceBytes = 16;
-constexpr std::size_t kMishapBytes = 17, kPeerBytes = 44;  // at least
+constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8, kFoundBytes = 12, kPlaceBytes = 16;
+constexpr std::size_t kMishapBytes = 17;  // at least
 constexpr std::uint8_t kHasBodies = 1, kHasCrossed = 2, kHasBroken = 4, kHasPlaces = 8;
-constexpr std::uint64_t kMostLinked = std::uint64_t{1} << 40;
-constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255, kLongestKey = 40;
+constexpr std::uint32_t kLongestText = 4096, kLongestReason = 64, kLongestHost = 255;
 
 // What several messages hold.
 
 void write(ByteWriter& out, const StepReport& r) {
     for (const float x : {r.seconds, r.smoothed_s, r.waited_s, r.processor_s}) out.number(x);
     for (const std::uint32_t n : {r.lead, r.ghost_age, r.cross_contacts, r.own}) out.number(n);
-    out.number(r.linked);
     out.matrix(r.outside_impulse);
     out.count(r.mishaps.size());
     for (const Mishap& m : r.mishaps) {
@@ -63,8 +59,6 @@ StepReport read_report(ByteReader& in) {
     }
     for (std::uint32_t* n : {&r.lead, &r.ghost_age, &r.cross_contacts, &r.own})
         *n = in.number<std::uint32_t>();
-    r.linked = in.number<std::uint64_t>();
-    if (r.linked > kMostLinked) throw DecodeError("a report of more bytes than can be");
     in.matrix(r.outside_impulse);
     if (!r.outside_impulse.allFinite()) throw DecodeError("a report that is not finite");
     r.mishaps.resize(in.count(kMishapBytes));
@@ -100,7 +94,6 @@ std::string shortened(const std::string& text) {
 // Bodies of messages, in order of types.
 
 void write_body(ByteWriter& out, const JoinRequest& m) {
-    out.number(m.fingerprint);
     out.append(m.secret);
     out.text(m.host.substr(0, kLongestHost));
 }
@@ -129,10 +122,6 @@ void read_numbers(ByteReader& in, std::vector<std::uint32_t>& numbers) {
     numbers.resize(in.count(4));
     for (std::uint32_t& number : numbers) number = in.number<std::uint32_t>();
 }
-void read_bytes(ByteReader& in, std::vector<std::uint8_t>& bytes) {
-    const std::span<const std::uint8_t> all = in.take(in.count(1));
-    bytes.assign(all.begin(), all.end());
-}
 void write_body(ByteWriter& out, const Members& m) {
     write_numbers(out, m.workers);
     out.number<std::uint8_t>(m.owners_follow);
@@ -147,16 +136,14 @@ void write_body(ByteWriter& out, const Ownership& m) {
     out.count(m.around_step.size());
     for (const std::uint64_t step : m.around_step) out.number(step);
 }
-void write_body(ByteWriter& out, const SnapshotMessage& m) {
-    write(out, m.snapshot);
+void write_body(ByteWriter& out, const PastMessage& m) {
+    write_numbers(out, m.broken);
     out.count(m.sales.size());
     for (const auto& [body, before, step] : m.sales) out.number(body), out.number(before), out.number(step);
 }
 void write_body(ByteWriter& out, const StateMessage& m) {
     write(out, m.report);
     write(out, m.bodies);
-    write(out, m.contacts);
-    write(out, m.springs);
 }
 void write_body(ByteWriter& out, const UpdateMessage& m) {
     write(out, m.report);
@@ -194,30 +181,6 @@ void write_body(ByteWriter& out, const Handover& m) {
     write(out, m.bodies);
 }
 
-void write_body(ByteWriter& out, const PartMessage& m) {
-    out.number<std::uint8_t>(m.gave_up);
-    out.count(m.bytes.size());
-    out.append(m.bytes);
-}
-void write_body(ByteWriter& out, const PublishedMessage& m) {
-    write(out, m.report);
-    write_numbers(out, m.bodies);
-}
-void write_body(ByteWriter& out, const RelayMessage& m) {
-    write_numbers(out, m.to);
-    out.count(m.part.size());
-    out.append(m.part);
-}
-void write_body(ByteWriter& out, const PeersMessage& m) {
-    out.count(m.peers.size());
-    for (const PeersMessage::Peer& peer : m.peers) {
-        out.number(peer.worker);
-        out.text(peer.endpoint.substr(0, kLongestHost));
-        out.text(peer.key.substr(0, kLongestKey));
-        out.append(peer.says);
-        out.append(peer.hears);
-    }
-}
 void write_body(ByteWriter& out, const Gather& m) {
     out.number(m.to);
     write_numbers(out, m.bodies);
@@ -227,7 +190,7 @@ void write_body(ByteWriter& out, const NeighbourMessage& m) {
                              (m.crossed.empty() ? 0 : kHasCrossed) | (m.broken.empty() ? 0 : kHasBroken) |
                              (m.places.empty() ? 0 : kHasPlaces);
     out.number(has);
-    out.number(m.number);
+    out.number(m.to);
     out.number(m.heard);
     out.number(m.smoothed_s);
     out.number(m.own);
@@ -250,24 +213,12 @@ void write_body(ByteWriter& out, const NeighbourMessage& m) {
     }
 }
 void write_body(ByteWriter& out, const FoundMessage& m) {
-    out.number(m.number);
+    out.number(m.to);
     out.number(m.epoch);
     write_found(out, m.steps);
 }
-void write_body(ByteWriter& out, const HeardMessage& m) {
-    out.number(m.number);
-    out.number<std::uint8_t>(m.again);
-}
-void write_body(ByteWriter& out, const LinkBeat& m) {
-    out.number<std::uint8_t>(m.hears);
-}
-void write_body(ByteWriter& out, const ReachMessage& m) {
-    out.text(m.endpoint.substr(0, kLongestHost));
-    out.text(m.key.substr(0, kLongestKey));
-}
 
 void read_body(ByteReader& in, JoinRequest& m) {
-    m.fingerprint = in.number<std::uint64_t>();
     m.secret = in.bytes<16>();
     m.host = read_words(in, kLongestHost);
 }
@@ -303,8 +254,8 @@ void read_body(ByteReader& in, Ownership& m) {
     for (std::uint64_t& step : m.around_step) step = in.number<std::uint64_t>();
     if (m.around_step.size() != m.around.size()) throw DecodeError("found states without their steps");
 }
-void read_body(ByteReader& in, SnapshotMessage& m) {
-    m.snapshot = read_snapshot(in);
+void read_body(ByteReader& in, PastMessage& m) {
+    read_numbers(in, m.broken);
     m.sales.resize(in.count(16));
     for (auto& [body, before, step] : m.sales) {
         body = in.number<std::uint32_t>(), before = in.number<std::uint32_t>();
@@ -314,34 +265,11 @@ void read_body(ByteReader& in, SnapshotMessage& m) {
 void read_body(ByteReader& in, StateMessage& m) {
     m.report = read_report(in);
     m.bodies = read_world_records(in);
-    m.contacts = read_contact_records(in);
-    m.springs = read_spring_records(in);
 }
 void read_body(ByteReader& in, UpdateMessage& m) {
     m.report = read_report(in);
     read_updates(in, m.bodies);
     read_numbers(in, m.broken);
-}
-void read_body(ByteReader& in, PartMessage& m) {
-    m.gave_up = in.flag();
-    read_bytes(in, m.bytes);
-}
-void read_body(ByteReader& in, PublishedMessage& m) {
-    m.report = read_report(in);
-    read_numbers(in, m.bodies);
-}
-void read_body(ByteReader& in, RelayMessage& m) {
-    read_numbers(in, m.to);
-    read_bytes(in, m.part);
-}
-void read_body(ByteReader& in, PeersMessage& m) {
-    m.peers.resize(in.count(kPeerBytes));
-    for (PeersMessage::Peer& peer : m.peers) {
-        peer.worker = in.number<std::uint32_t>();
-        peer.endpoint = read_words(in, kLongestHost);
-        peer.key = read_words(in, kLongestKey);
-        peer.says = in.bytes<16>(), peer.hears = in.bytes<16>();
-    }
 }
 void read_body(ByteReader& in, Gather& m) {
     m.to = in.number<std::uint32_t>();
@@ -350,8 +278,8 @@ void read_body(ByteReader& in, Gather& m) {
 void read_body(ByteReader& in, NeighbourMessage& m) {
     const auto has = in.number<std::uint8_t>();
     if (has >= 2 * kHasPlaces) throw DecodeError("lists of no known kind");
-    m.number = in.number<std::uint32_t>();
-    m.heard = in.number<std::uint32_t>();
+    m.to = in.number<std::uint32_t>();
+    m.heard = in.number<std::uint64_t>();
     m.smoothed_s = in.number<float>();
     if (!(m.smoothed_s >= 0 && m.smoothed_s <= 1e9f)) throw DecodeError("a report of a time out of range");
     m.own = in.number<std::uint32_t>();
@@ -377,20 +305,9 @@ void read_body(ByteReader& in, NeighbourMessage& m) {
         throw DecodeError("a list of nothing");
 }
 void read_body(ByteReader& in, FoundMessage& m) {
-    m.number = in.number<std::uint32_t>();
+    m.to = in.number<std::uint32_t>();
     m.epoch = in.number<std::uint32_t>();
     read_found(in, m.steps);
-}
-void read_body(ByteReader& in, HeardMessage& m) {
-    m.number = in.number<std::uint32_t>();
-    m.again = in.flag();
-}
-void read_body(ByteReader& in, LinkBeat& m) {
-    m.hears = in.flag();
-}
-void read_body(ByteReader& in, ReachMessage& m) {
-    m.endpoint = read_words(in, kLongestHost);
-    m.key = read_words(in, kLongestKey);
 }
 void read_body(ByteReader& in, StruckAssign& m) {
     m = read_struck_assign(in);
@@ -443,16 +360,15 @@ void expect(const char* what, std::uint64_t found, std::uint64_t expected) {
                       std::to_string(expected));
 }
 
-/// Checks length and checksum; returns the type.
+/// Checks the length; returns the type.
 std::uint16_t read_header(std::span<const std::uint8_t> bytes, MessageHeader& header) {
-    if (bytes.size() < kHeaderBytes + kChecksumBytes)
+    if (bytes.size() < kHeaderBytes)
         throw DecodeError("a message of " + std::to_string(bytes.size()) + " bytes");
-    ByteReader in(bytes.first(kHeaderBytes)), trailer(bytes.last(kChecksumBytes));
+    ByteReader in(bytes.first(kHeaderBytes));
     for (const std::uint8_t letter : kMagic) expect("first letters:", in.number<std::uint8_t>(), letter);
     expect("version", in.number<std::uint16_t>(), kProtocol);
     const auto type = in.number<std::uint16_t>();
     expect("length", in.number<std::uint32_t>(), bytes.size());
-    expect("checksum", trailer.number<std::uint32_t>(), crc32c(bytes.first(bytes.size() - kChecksumBytes)));
     header.worker = in.number<std::uint32_t>();
     header.epoch = in.number<std::uint32_t>();
     header.step = in.number<std::uint64_t>();
@@ -461,7 +377,7 @@ std::uint16_t read_header(std::span<const std::uint8_t> bytes, MessageHeader& he
 
 /// Of a message whose header has been read.
 void read_message(std::uint16_t type, std::span<const std::uint8_t> bytes, WorkerMessage& into) {
-    ByteReader body(bytes.subspan(kHeaderBytes, bytes.size() - kHeaderBytes - kChecksumBytes));
+    ByteReader body(bytes.subspan(kHeaderBytes));
     try {
         read_message(std::size_t{type}, body, into);
         body.expect_end();
@@ -474,7 +390,6 @@ void read_message(std::uint16_t type, std::span<const std::uint8_t> bytes, Worke
 
 std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessage& message) {
     ByteWriter out;
-    if (const auto* part = std::get_if<PartMessage>(&message)) out.bytes().reserve(64 + part->bytes.size());
     for (const std::uint8_t letter : kMagic) out.number(letter);
     out.number(kProtocol);
     out.number(static_cast<std::uint16_t>(message.index() + 1));
@@ -483,9 +398,8 @@ std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessag
     out.number(header.epoch);
     out.number(header.step);
     std::visit([&](const auto& m) { write_body(out, m); }, message);
-    const auto length = static_cast<std::uint32_t>(out.bytes().size() + kChecksumBytes);
+    const auto length = static_cast<std::uint32_t>(out.bytes().size());
     std::memcpy(out.bytes().data() + kLengthAt, &length, sizeof length);
-    out.number(crc32c(out.bytes()));
     return std::move(out.bytes());
 }
 

@@ -9,6 +9,7 @@
 #include "messages/secret.h"
 #include "messages/struck_messages.h"
 #include "sim/distributed_world.h"
+#include "world/shared_world.h"
 
 namespace sim {
 
@@ -17,20 +18,19 @@ namespace sim {
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 14
+//   4       2      version, 16
 //   6       2      type
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
 //   16      4      epoch of ownership, as the sender knows it
 //   20      8      step: number of steps that the sender has done
 //   28      ...    body, by type
-//   end-4   4      CRC-32C (Castagnoli, reflected) of everything before
 //
 // f64, f32, f16 are IEEE numbers bit by bit, v3 = 3 f64, w3 = 3 f32, flag = u8 of 0 or 1, text = u32 length
 // and bytes, list = u32 count and the elements, b/m = u32: body below 2^24, and number of modes (at most
 // 128) times 2^24.
 //
-//    1 join       worker  u64 fingerprint, 16 bytes: its secret, text host
+//    1 join       worker  16 bytes: its secret, text host
 //    2 beat       both    16 bytes: the worker's secret; zeros from the application
 //    3 drained    worker  nothing
 //    4 failure    worker  text
@@ -40,40 +40,30 @@ namespace sim {
 //    8 members    app     list of u32, flag owners follow
 //    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of record and of u64
 //                         (around, their steps)
-//   10 snapshot   app     u64 step, list of record, list of contact, list of spring, v3 outside impulse
-//   11 state      worker  report, list of record, list of contact, list of spring
+//   10 past       app     list of u32 (constraints that hold no more), list of {u32 body, u32 before, u64 step} (sales)
+//   11 state      worker  report, list of record
 //   12 update     worker  report, lists of update, u32 (constraints that broke)
 //   13 offer      worker  u32 to, u32 number, flag gathers, list of {u32 body, f32 seconds}
 //   14 answer     worker  u32 to, u32 number, flag accepted
 //   15 handover   worker  u32 to, u32 number, list of record
-//   16 part       worker  flag gave up, list of u8
-//   17 published  app     report, list of u32 (bodies)
-//   18 relay      worker  list of u32 (to), list of u8 (a message to these, encoded)
-//   19 peers      app     list of {u32 worker, texts endpoint, key, 16 bytes: what it says, 16 bytes: what it hears}
-//   20 link       worker  flag hears
-//   21 reach      worker  texts endpoint, key
-//   22 to 24 of struck bodies, see struck_messages.h; of the others a play and its workers use 1, 2, 4, 6 and 7
-//   25 gather    app     u32 to, list of u32 (bodies)
-//   26 leaves    worker  nothing
-//   27 neighbour worker  u8 (1 bodies, 2 crossed, 4 broken, 8 places), u32 number, u32 heard, f32 smoothed, u32 own, w3 low, w3 high, u64 parts,
-//                        f32 speed; lists, if they are there, of update, crossed, u32 (constraints that broke), place
-//   28 found     worker  u32 number, u32 epoch, list of {u64 step, list of crossed}
-//   29 heard     worker  u32 number, flag again
+//   16 to 18 of struck bodies, see struck_messages.h; of the others a play and its workers use 1, 2, 4, 6 and 7
+//   19 gather     app     u32 to, list of u32 (bodies)
+//   20 leaves     worker  nothing
+//   21 neighbour  worker  u8 (1 bodies, 2 crossed, 4 broken, 8 places), u32 to, u64 heard, f32 smoothed, u32 own,
+//                         w3 low, w3 high, u64 parts, f32 speed; lists, if they are there, of update, crossed,
+//                         u32 (constraints that broke), place
+//   22 found      worker  u32 to, u32 epoch, list of {u64 step, list of crossed}
 //
-//   report      68 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
-//               cross contacts, own; u64 linked; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
+//   report      60 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
+//               cross contacts, own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
 //   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
 //               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
 //               v3 angular momentum, f64 q[m], f64 q'[m]
-//   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging),
-//               u8 n points of {u32 feature, w3 arm, f32 normal impulse, w3 friction impulse}
-//   spring      17 bytes: u32 constraint, flag holds, w3 impulse
 //   update      37 + 3 m bytes, 73 with 12 modes, 36 with none; if held, 13 + m more, 98 in all:
 //               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
 //               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of
 //               2^(4 E - 44) kg m^2/s, f16 q[m], small q'[m]; held: 3 f16 linear, 3 f16 angular, small modal[m]
 //   small       of n numbers, if there are any: i8 E, n i8 in units of 2^E, E the least with which none is beyond 127
-//   found       16 bytes and its crossed: u32 worker, u64 step, list of crossed
 //   place       16 bytes: u32 body, w3 position
 //   crossed     33 bytes: u32 own (+ 2^31: blow), u32 other, u8 E of the first and 16 times E of the second, w3 linear on own,
 //               3 i16 angular on own, 3 i16 angular on other, in units of 2^(4 E - 44) kg m^2/s
@@ -91,11 +81,11 @@ namespace sim {
 // step. Its numbers do not travel: zeros stand for them (and w = 1 for the orientation; in an update the
 // angular momentum is -32768 three times), and the decoder sets the position to NaN.
 //
-// Decoders check length, checksum, counts, flags, that every number is finite and in range, that nothing is
+// Decoders check length, counts, flags, that every number is finite and in range, that nothing is
 // left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
-constexpr std::uint16_t kProtocol = 15;  ///< version, of messages and of how worlds step
+constexpr std::uint16_t kProtocol = 16;  ///< version, of messages and of how worlds step
 
 struct MessageHeader {
     std::uint32_t worker = kApplication;
@@ -116,24 +106,20 @@ struct StepReport {
     float seconds = 0, smoothed_s = 0, waited_s = 0, processor_s = 0;  ///< see WorkerStep
     std::uint32_t lead = 0, ghost_age = 0, cross_contacts = 0;
     std::uint32_t own = 0;
-    std::uint64_t linked = 0;  ///< bytes that it sent to other workers directly, since its last report
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start
     std::vector<Mishap> mishaps;                                ///< of the step
 };
 
 // Worker to application.
 struct JoinRequest {
-    std::uint64_t fingerprint = 0;
     Secret secret = {};
     std::string host;  ///< printable ASCII, whatever was sent; at most 255 characters
-    std::string address =
-        {};  ///< not sent: IP address of its connection, as the application sees it; empty: none
 };
 struct Beat {  ///< both ways, every 0.1 s
     Secret secret = {};
 };
 struct Drained {};      ///< worker: has given away all it owned and leaves
-struct Leaves {};       ///< bounded, worker: wants to; gets a Gather for all it owns
+struct Leaves {};       ///< worker: wants to; gets a Gather for all it owns
 struct WorkerFailure {  ///< worker: cannot go on
     std::string what;
 };
@@ -153,8 +139,8 @@ struct EndOfRun {};
 // Application to all workers.
 struct Members {
     std::vector<std::uint32_t> workers;
-    /// Owners of some bodies are told next, then this message comes again without the flag. Until then nobody steps out of
-    /// step with others.
+    /// Owners of some bodies are told next, then this message comes again without the flag. Until then nobody
+    /// steps.
     bool owners_follow = false;
 };
 /// Impulses at the contacts of own bodies with others' that a worker found in a step.
@@ -167,10 +153,10 @@ struct FoundStep {
 struct Ownership {
     std::uint32_t owner = 0;
     std::uint32_t from = kApplication;  ///< the owner before; kApplication: none
-    bool traded = false;  ///< to a buyer; else at the start, after a loss, or as one drains in lockstep
+    bool traded = false;                ///< to a buyer; else at the start, or after a loss
     std::uint64_t step = 0;
-    std::vector<WorldRecord> bodies;  ///< exact; without a handover in bounded pace as last published
-    /// Bounded, to the owner alone, which was not told of what is here before: others' bodies near these, as last published.
+    std::vector<WorldRecord> bodies;  ///< exact; without a handover as last published
+    /// To the owner alone, which was not told of what is here before: others' bodies near these, as last published.
     std::vector<WorldRecord> around = {};
     std::vector<std::uint64_t> around_step = {};  ///< of each
 };
@@ -179,25 +165,21 @@ struct PastSale {
     std::uint32_t body, before;
     std::uint64_t step;
 };
-/// Everything at the end of a step that all have done, for a worker that joins late, or a run that goes on from there.
-struct SnapshotMessage {
-    WorldSnapshot snapshot;
-    std::vector<PastSale> sales =
-        {};  ///< bounded: of the steps that are still compared; of each body ascending
+/// For a worker that joins late: what has been up to the header's step, which all have done.
+struct PastMessage {
+    std::vector<std::uint32_t> broken;  ///< constraints that hold no more
+    std::vector<PastSale> sales;        ///< of the steps that are still compared; of each body ascending
 };
 
 // Worker to the application after each step.
 
-/// Lockstep: all own bodies, and the contacts and constraints that belong to them. Passed on to those who own nothing.
-/// Bounded: own bodies once more after the last step, exact, as what came late has put them right. For the application alone.
+/// Own bodies once more after the last step, exact, as what came late has put them right.
 struct StateMessage {
     StepReport report;
     std::vector<WorldRecord> bodies;
-    std::vector<ContactRecord> contacts;
-    std::vector<SpringRecord> springs;
 };
 
-/// Bounded. One body's state, quantised: at most 98 bytes with 12 modes.
+/// One body's state, quantised: at most 98 bytes with 12 modes.
 struct Update {
     std::uint32_t body = 0;
     bool asleep = false, still = false, quarantined = false;
@@ -209,13 +191,6 @@ struct UpdateMessage {  ///< all that the step made of own bodies
     StepReport report;
     std::vector<Update> bodies;         ///< own, ascending
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
-};
-
-/// A StateMessage as those get it who own something, with the sender's header: they do all steps themselves, and need no more
-/// than that the sender is there. The report is without its mishaps.
-struct PublishedMessage {
-    StepReport report;
-    std::vector<std::uint32_t> bodies;
 };
 
 /// Updates as bytes: of those that one worker tells another few are needed soon, and those are read then.
@@ -242,6 +217,8 @@ private:
     std::vector<Place> places_;
 };
 
+// Worker to worker, through the application, which passes them on in the order in which they came.
+
 constexpr double kFurthestReach = 1e8;  ///< of a reach, from the origin [m]
 /// Where a worker's bodies are and go, see shared/nearness.h: a box around them [m], which is empty if it has none; of its two longest
 /// sides, each cut into 8, those of the 64 parts in which they are.
@@ -250,12 +227,11 @@ struct Reach {
     std::uint64_t parts = 0;
     float speed = 0;  ///< of the fastest [m/s]
 };
-/// Bounded, worker to worker after each step, see workers/peer_links.h: what the receiver needs of it. Bodies that it does not name
-/// are not near the receiver's, unless they sleep and it was told so.
+/// After each step to each other worker: what the receiver needs of it. Bodies that it does not name are not near the
+/// receiver's, unless they sleep and it was told so.
 struct NeighbourMessage {
-    std::uint32_t number =
-        0;  ///< from 1, of what the sender tells the receiver in NeighbourMessages and FoundMessages
-    std::uint32_t heard = 0;  ///< the sender has heard the receiver's up to this number
+    std::uint32_t to = 0;
+    std::uint64_t heard = 0;  ///< step of the receiver's last message that the sender has heard
     float smoothed_s = 0;     ///< see WorkerStep
     std::uint32_t own = 0;    ///< number of the sender's bodies
     Reach reach;              ///< of these
@@ -270,20 +246,14 @@ struct NeighbourMessage {
     std::vector<Place> places;  ///< of all own bodies, every kPlacesEvery steps, for load balancing
 };
 constexpr std::uint64_t kPlacesEvery = 32;
-/// Bounded, worker to worker, to who has just got bodies: what the sender found at them in the last steps.
+/// To who has just got bodies: what the sender found at them in the last steps.
 struct FoundMessage {
-    std::uint32_t number = 0;  ///< see NeighbourMessage
-    std::uint32_t epoch = 0;   ///< in which they changed owners
+    std::uint32_t to = 0;
+    std::uint32_t epoch = 0;  ///< in which they changed owners
     std::vector<FoundStep> steps;
 };
-/// Bounded, worker to worker: the sender has heard the receiver's messages up to this number. again: it waits, and asks for the later
-/// ones, by way of the application.
-struct HeardMessage {
-    std::uint32_t number = 0;
-    bool again = false;
-};
 
-// Worker to worker, through the application. The market.
+// Likewise, of the market.
 struct Offer {
     std::uint32_t to = 0, number = 0;  ///< number: of the seller's offers
     std::vector<std::uint32_t> bodies;
@@ -301,51 +271,17 @@ struct Handover {
     std::vector<WorldRecord> bodies;
 };
 
-/// From the application, in bounded pace: these bodies belong to a structure (shared/structures.h) of which another worker has
+/// From the application: these bodies belong to a structure (shared/structures.h) of which another worker has
 /// most, or their owner leaves: it offers them to that one. To the application: there is no other, it hands over what it has.
 struct Gather {
     std::uint32_t to = 0;
     std::vector<std::uint32_t> bodies;
 };
 
-/// Lockstep, within the step that begins at the header's: what a worker tells others with whom it does the step together
-/// (world/partners.h). gave_up: nothing more of this step comes from it. Worker to worker, see workers/peer_links.h.
-struct PartMessage {
-    bool gave_up = false;
-    std::vector<std::uint8_t> bytes;
-};
-/// To the application: a message to other workers, for those whom its sender cannot reach.
-struct RelayMessage {
-    std::vector<std::uint32_t> to;
-    std::vector<std::uint8_t> part;  ///< encoded
-};
-
-/// To the application: where other workers reach this one, once it listens there. Printable ASCII, whatever was sent.
-struct ReachMessage {
-    std::string endpoint;  ///< at most 255 characters
-    std::string key;       ///< public, of CURVE; empty: none
-};
-/// From the application: how to reach others. Once one can be reached, it is told to those that were before, and they to it.
-/// Every pair has two secrets, by which each knows the other one.
-struct PeersMessage {
-    struct Peer {
-        std::uint32_t worker = 0;
-        std::string endpoint, key;
-        Secret says = {}, hears = {};
-    };
-    std::vector<Peer> peers;
-};
-/// Worker to worker, every 0.1 s. hears: the sender has heard from the other one not long ago.
-struct LinkBeat {
-    bool hears = false;
-};
-
 using WorkerMessage =
     std::variant<JoinRequest, Beat, Drained, WorkerFailure, SceneMessage, Refusal, EndOfRun, Members,
-                 Ownership, SnapshotMessage, StateMessage, UpdateMessage, Offer, OfferAnswer, Handover,
-                 PartMessage, PublishedMessage, RelayMessage, PeersMessage, LinkBeat, ReachMessage,
-                 StruckAssign, StruckStep, StruckAnswer, Gather, Leaves, NeighbourMessage, FoundMessage,
-                 HeardMessage>;
+                 Ownership, PastMessage, StateMessage, UpdateMessage, Offer, OfferAnswer, Handover,
+                 StruckAssign, StruckStep, StruckAnswer, Gather, Leaves, NeighbourMessage, FoundMessage>;
 
 [[nodiscard]] std::vector<std::uint8_t> encode(const MessageHeader& header, const WorkerMessage& message);
 struct DecodedMessage {

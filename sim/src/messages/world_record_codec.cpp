@@ -4,13 +4,12 @@
 #include <limits>
 
 #include "body/body_kind.h"
-#include "contact/manifold.h"
 
 namespace sim {
 namespace {
 
 constexpr std::uint8_t kAsleep = 1, kQuarantined = 2, kAtLimit = 4, kBroken = 8;
-constexpr std::size_t kSmallestRecord = 115, kSmallestContact = 10, kSpringBytes = 41;
+constexpr std::size_t kSmallestRecord = 115;
 constexpr double kFurthest = 1e7, kFastest = 1e6;  // m, m/s: as World quarantines
 
 void write_doubles(ByteWriter& out, const Eigen::VectorXd& v, bool zeros) {
@@ -20,22 +19,6 @@ void write_doubles(ByteWriter& out, const Eigen::VectorXd& v, bool zeros) {
 Eigen::VectorXd read_doubles(ByteReader& in, int n) {
     Eigen::VectorXd v(n);
     in.matrix(v);
-    return v;
-}
-
-void write_floats(ByteWriter& out, const Eigen::Vector3f& v) {
-    for (int i = 0; i < 3; ++i) out.number(v[i]);
-}
-
-float finite_float(ByteReader& in) {
-    const auto value = in.number<float>();
-    if (!std::isfinite(value)) throw DecodeError("an impulse that is not finite");
-    return value;
-}
-
-Eigen::Vector3f read_floats(ByteReader& in) {
-    Eigen::Vector3f v;
-    for (int i = 0; i < 3; ++i) v[i] = finite_float(in);
     return v;
 }
 
@@ -89,47 +72,6 @@ WorldRecord read_record(ByteReader& in) {
     return r;
 }
 
-void write(ByteWriter& out, const ContactRecord& c) {
-    out.number(static_cast<std::uint32_t>(c.a));
-    out.number(static_cast<std::uint32_t>(c.b));
-    out.number<std::uint8_t>(c.emerging);
-    out.number(static_cast<std::uint8_t>(c.count));
-    for (int i = 0; i < c.count; ++i) {
-        out.number(c.points[i].feature);
-        write_floats(out, c.points[i].arm_a);
-        out.number(c.points[i].normal_impulse);
-        write_floats(out, c.points[i].friction_impulse);
-    }
-}
-
-ContactRecord read_contact(ByteReader& in) {
-    ContactRecord c;
-    const auto a = in.number<std::uint32_t>(), b = in.number<std::uint32_t>();
-    c.emerging = in.flag();
-    c.count = in.number<std::uint8_t>();
-    const bool two_bodies = a < b && b < kMostWorldBodies;
-    const bool plane = a < kMostWorldBodies && b >= kFirstPlane && b < kFirstPlane + kMostWorldBodies;
-    if (!(two_bodies || plane) || c.count > 4) throw DecodeError("a contact out of range");
-    c.a = static_cast<int>(a), c.b = static_cast<int>(b);
-    for (int i = 0; i < c.count; ++i) {
-        c.points[i].feature = in.number<std::uint32_t>();
-        c.points[i].arm_a = read_floats(in);
-        c.points[i].normal_impulse = finite_float(in);
-        c.points[i].friction_impulse = read_floats(in);
-    }
-    return c;
-}
-
-SpringRecord read_spring(ByteReader& in) {
-    SpringRecord s;
-    const auto constraint = in.number<std::uint32_t>();
-    if (constraint >= kMostWorldBodies) throw DecodeError("a constraint out of range");
-    s.constraint = static_cast<int>(constraint);
-    s.holds = in.flag();
-    for (Eigen::Vector3f& impulse : s.impulses) impulse = read_floats(in);
-    return s;
-}
-
 }  // namespace
 
 std::uint32_t body_and_modes(std::uint32_t body, Eigen::Index modes) {
@@ -160,55 +102,10 @@ void write(ByteWriter& out, const std::vector<WorldRecord>& records) {
     for (const WorldRecord& r : records) write(out, r);
 }
 
-void write(ByteWriter& out, const std::vector<ContactRecord>& contacts) {
-    out.count(contacts.size());
-    for (const ContactRecord& c : contacts) write(out, c);
-}
-
-void write(ByteWriter& out, const std::vector<SpringRecord>& springs) {
-    out.count(springs.size());
-    for (const SpringRecord& s : springs) {
-        out.number(static_cast<std::uint32_t>(s.constraint));
-        out.number<std::uint8_t>(s.holds);
-        for (const Eigen::Vector3f& impulse : s.impulses) write_floats(out, impulse);
-    }
-}
-
-void write(ByteWriter& out, const WorldSnapshot& snapshot) {
-    out.number(snapshot.step);
-    write(out, snapshot.bodies);
-    write(out, snapshot.contacts);
-    write(out, snapshot.springs);
-    out.matrix(snapshot.outside);
-}
-
 std::vector<WorldRecord> read_world_records(ByteReader& in) {
     std::vector<WorldRecord> records(in.count(kSmallestRecord));
     for (WorldRecord& r : records) r = read_record(in);
     return records;
-}
-
-std::vector<ContactRecord> read_contact_records(ByteReader& in) {
-    std::vector<ContactRecord> contacts(in.count(kSmallestContact));
-    for (ContactRecord& c : contacts) c = read_contact(in);
-    return contacts;
-}
-
-std::vector<SpringRecord> read_spring_records(ByteReader& in) {
-    std::vector<SpringRecord> springs(in.count(kSpringBytes));
-    for (SpringRecord& s : springs) s = read_spring(in);
-    return springs;
-}
-
-WorldSnapshot read_snapshot(ByteReader& in) {
-    WorldSnapshot snapshot;
-    snapshot.step = in.number<std::uint64_t>();
-    snapshot.bodies = read_world_records(in);
-    snapshot.contacts = read_contact_records(in);
-    snapshot.springs = read_spring_records(in);
-    in.matrix(snapshot.outside);
-    if (!snapshot.outside.allFinite()) throw DecodeError("an impulse that is not finite");
-    return snapshot;
 }
 
 }  // namespace sim

@@ -3,7 +3,7 @@
 
 namespace sim {
 
-// Records of bodies, contacts and constraints, exact; see worker_messages.h for the layout.
+// Records of bodies, exact; see worker_messages.h for the layout.
 
 constexpr std::uint32_t kMostWorldBodies = 1u << 24;
 
@@ -19,12 +19,6 @@ struct BodyAndModes {
 [[nodiscard]] bool is_broken(const WorldBodyState& state);
 
 void write(ByteWriter& out, const std::vector<WorldRecord>& records);
-void write(ByteWriter& out, const std::vector<ContactRecord>& contacts);
-void write(ByteWriter& out, const std::vector<SpringRecord>& springs);
-void write(ByteWriter& out, const WorldSnapshot& snapshot);
-[[nodiscard]] std::vector<WorldRecord> read_world_records(ByteReader& in);  ///< all readers throw DecodeError
-[[nodiscard]] std::vector<ContactRecord> read_contact_records(ByteReader& in);
-[[nodiscard]] std::vector<SpringRecord> read_spring_records(ByteReader& in);
-[[nodiscard]] WorldSnapshot read_snapshot(ByteReader& in);
+[[nodiscard]] std::vector<WorldRecord> read_world_records(ByteReader& in);  ///< throws DecodeError
 
 }  // namespace sim

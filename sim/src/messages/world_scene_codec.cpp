@@ -23,7 +23,7 @@ namespace {
 //               u8 joint, f64 frame of a, of b: w x y z, u8 collide (0 no, 1 yes, 2 by default)
 //   force       i32 body, v3 point, v3 force, flag turns, f64 from until
 //   event       u64 step, list of i32 constraint, u32 first, u32 end, list of {i32 worker, f64 factor}
-//   settings    u8 pace, i32 bound, u64 steps, flag until rest, flag all to first, flag trade, u64 from step,
+//   settings    i32 bound, u64 steps, flag until rest, flag all to first, flag trade, u64 from step,
 //               f64 smoothing steps,
 //               f64 dead band
 
@@ -326,19 +326,15 @@ WorldScene read_scene(ByteReader& in) {
 }
 
 void write(ByteWriter& out, const DistributedSettings& s) {
-    out.number(static_cast<std::uint8_t>(s.pace));
     write_all(out, std::int32_t{s.bound}, s.steps, std::uint8_t{s.until_rest}, std::uint8_t{s.all_to_first},
-              std::uint8_t{s.together}, std::uint8_t{s.market.trade}, s.market.from_step,
-              s.market.smoothing_steps, s.market.dead_band);
+              std::uint8_t{s.market.trade}, s.market.from_step, s.market.smoothing_steps, s.market.dead_band);
 }
 
 DistributedSettings read_settings(ByteReader& in) {
     DistributedSettings s;
-    s.pace = read_enum(in, Pace::bounded);
     read_all(in, s.bound, s.steps);
     s.until_rest = in.flag();
     s.all_to_first = in.flag();
-    s.together = in.flag();
     s.market.trade = in.flag();
     read_all(in, s.market.from_step, s.market.smoothing_steps, s.market.dead_band);
     check_settings(s);

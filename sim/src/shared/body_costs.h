@@ -2,7 +2,7 @@
 #include <span>
 #include <vector>
 
-#include "sim/world.h"
+#include "world/shared_world.h"
 
 namespace sim {
 
@@ -12,7 +12,7 @@ public:
     static constexpr double kSmoothing = 5;  ///< time constant [steps]
     explicit BodyCosts(int bodies) : cost_(static_cast<std::size_t>(bodies), -1.0) {}
     /// After a step, of the bodies that took part in it.
-    void add(const World& world, std::span<const int> bodies);
+    void add(const SharedWorld& world, std::span<const int> bodies);
     /// Forgets a body's cost; its smoothing starts anew.
     void forget(int body) { cost_[static_cast<std::size_t>(body)] = -1; }
     /// Negative: unknown.

@@ -11,8 +11,6 @@ namespace {
 
 constexpr std::uint64_t kTouchingSteps = 4;
 
-constexpr std::uint32_t kTellHeardAfter = 16;  // messages
-
 // Steps that workers whose bodies touch may be apart: bodies hold each other up by what was, and the older that is, the less
 // steady they stand. Where few touch it matters less than waiting does.
 std::uint64_t touching_lead(int bound, int pairs) {
@@ -38,7 +36,6 @@ void average(StepImpulse& mean, const StepImpulse* now, double weight) {
 BoundedExchange::BoundedExchange(const SceneMessage& scene)
     : self_(scene.worker),
       settings_(scene.settings),
-      check_(with_later(scene.scene), scene.scene.world.constraints.size(), scene.settings.steps),
       world_(scene.scene.world),
       clock_(scene.scene),
       costs_(clock_.bodies()),
@@ -47,7 +44,6 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
                structure_outlook(scene.settings.bound, scene.scene.world.settings.dt)),
       foreign_(world_, self_, clock_.bodies(), kept_steps(scene.settings.bound)),
       contacts_(world_, foreign_, self_, {own_, awaits_, owner_}, kept_steps(scene.settings.bound)),
-      streams_(static_cast<std::size_t>(clock_.bodies()), scene.settings.bound),
       telling_(static_cast<std::size_t>(clock_.bodies()), scene.settings.bound, scene.scene.world.settings,
                columns_.side()) {
     for (const PointConstraint& c : scene.scene.world.constraints)
@@ -58,7 +54,6 @@ BoundedExchange::BoundedExchange(const SceneMessage& scene)
     for (std::size_t c = 0; c < scene.scene.world.constraints.size(); ++c)
         if (std::isfinite(scene.scene.world.constraints[c].breaking_force))
             breakable_.push_back(static_cast<std::uint32_t>(c));
-    world_.share(Sharing::pairs);
     for (int i = 0; i < world_.bodies(); ++i) {
         if (!clock_.moves(i)) continue;
         world_.set_own(i, false);
@@ -100,54 +95,6 @@ void BoundedExchange::come_to(std::uint64_t step) {
 
 void BoundedExchange::take(const MessageHeader& header, NeighbourMessage&& message) {
     if (!telling_.has(header.worker)) return;  // it is gone
-    checked(header, [&] {
-        check_.check(header, message);
-        streams_.heard_by(header.worker, message.heard);
-        streams_.put(header, std::move(message));
-    });
-    hear_all();
-}
-
-void BoundedExchange::take(const MessageHeader& header, FoundMessage&& message) {
-    if (!telling_.has(header.worker)) return;
-    checked(header, [&] {
-        check_.check(header, message);
-        streams_.put(header, std::move(message));
-    });
-    hear_all();
-}
-
-// Answers go by way of the application, which sees that this one is there.
-void BoundedExchange::take(const MessageHeader& header, const HeardMessage& message) {
-    if (!telling_.has(header.worker)) return;
-    streams_.heard_by(header.worker, message.number);
-    if (!message.again) return;
-    for (std::vector<std::uint8_t>& bytes : streams_.again(header.worker))
-        send_({header.worker}, std::move(bytes), true);
-    send(header.worker, HeardMessage{streams_.tell_heard(header.worker), false}, true);
-}
-
-// Whatever has its turn now.
-void BoundedExchange::hear_all() {
-    std::uint32_t epoch = epoch_;
-    for (bool any = true; any;) {
-        any = false;
-        for (const Sold& sold : sold_) epoch = std::min(epoch, sold.epoch - 1);
-        telling_.each([&](std::uint32_t worker) {
-            while (std::optional<NeighbourStreams::Heard> next = streams_.take(worker, epoch)) {
-                any = true;
-                std::visit([&](auto&& m) { hear(next->header, std::move(m)); }, std::move(next->message));
-            }
-            // Who tells nothing of steps says so otherwise.
-            if (streams_.untold(worker) >= kTellHeardAfter && (owned_.empty() || at_end()))
-                send(worker, HeardMessage{streams_.tell_heard(worker), false}, false);
-        });
-        std::erase_if(sold_, [this](const Sold& sold) { return told(sold.from) >= sold.step; });
-        epoch = epoch_;
-    }
-}
-
-void BoundedExchange::hear(const MessageHeader& header, NeighbourMessage&& message) {
     const std::uint32_t worker = header.worker;
     knows_[worker] = header.epoch;
     std::uint64_t &known = known_[worker], &told = told_[worker];
@@ -167,7 +114,7 @@ void BoundedExchange::hear(const MessageHeader& header, NeighbourMessage&& messa
     compare(worker, header.step);
 }
 
-void BoundedExchange::hear(const MessageHeader& header, FoundMessage&& message) {
+void BoundedExchange::take(const MessageHeader& header, FoundMessage&& message) {
     const auto purchase = std::ranges::find(purchases_, message.epoch, &Purchase::epoch);
     if (purchase == purchases_.end() || purchase->silent.erase(header.worker) == 0) return;
     for (FoundStep& found : message.steps) {
@@ -180,23 +127,11 @@ void BoundedExchange::hear(const MessageHeader& header, FoundMessage&& message) 
 }
 
 // Bodies follow with their owners.
-void BoundedExchange::take(SnapshotMessage&& message) {
+void BoundedExchange::take(const MessageHeader& header, const PastMessage& message) {
     late_ = true;
     for (const PastSale& sale : message.sales) contacts_.sold(sale);
-    world_.restore_contacts({}, message.snapshot.springs);
-    come_to(message.snapshot.step);
-}
-
-bool BoundedExchange::all_have_heard() {
-    bool all = true;
-    telling_.each([&](std::uint32_t worker) {
-        if (streams_.all_heard_by(worker)) return;
-        all = false;
-        const std::uint32_t next = streams_.next_number(worker);
-        if (std::exchange(asked_up_to_[worker], next) == next) return;
-        send(worker, HeardMessage{streams_.tell_heard(worker), true}, true);
-    });
-    return all;
+    for (const std::uint32_t c : message.broken) world_.remove_constraint(static_cast<int>(c));
+    come_to(header.step);
 }
 
 int BoundedExchange::lead() const {
@@ -212,12 +147,6 @@ bool BoundedExchange::ready() const {
         const auto& [worker, touch] = t;
         return touch.step + kTouchingSteps < step_ || !owns_any(worker) ||
                known(worker) + touching_lead(settings_.bound, touch.pairs) >= step_;
-    });
-}
-
-void BoundedExchange::ask_again() {
-    telling_.each([this](std::uint32_t worker) {
-        send(worker, HeardMessage{streams_.tell_heard(worker), true}, true);
     });
 }
 
@@ -280,7 +209,7 @@ void BoundedExchange::feel() {
     }
 }
 
-void BoundedExchange::step(const StepChannel&) {
+void BoundedExchange::step() {
     if (at_end()) {
         settled_ = published_ == step_;  // else, having come here by taking bodies over, it says so first
         return;
@@ -326,7 +255,7 @@ void BoundedExchange::publish_last(const StepReport& report) const {
     StateMessage message;
     message.report = report;
     for (const int body : owned_) message.bodies.push_back(world_.record(body));
-    send_({}, encode({self_, epoch_, step_}, message), true);
+    send(message);
 }
 
 void BoundedExchange::publish(std::uint32_t epoch, const StepReport& report) {
@@ -357,7 +286,7 @@ void BoundedExchange::publish(std::uint32_t epoch, const StepReport& report) {
     crossed_.clear();
     message.broken.swap(broken_), broken_.clear();
     published_ = step_;
-    send_({}, encode({self_, epoch_, step_}, outgoing_), true);
+    send(outgoing_);
 }
 
 void BoundedExchange::see(int body, const WorldBodyState& state, bool asleep) {
@@ -387,7 +316,7 @@ void BoundedExchange::tell_neighbours(const StepReport& report) {
 
 void BoundedExchange::tell(std::uint32_t worker) {
     auto& message = std::get<NeighbourMessage>(to_neighbour_);
-    message.number = streams_.next_number(worker), message.heard = streams_.tell_heard(worker);
+    message.to = worker, message.heard = told(worker);
     message.bodies.clear();
     for (const std::size_t which : telling_.choose(worker, step_)) {
         pack(which);
@@ -397,14 +326,7 @@ void BoundedExchange::tell(std::uint32_t worker) {
     std::ranges::copy_if(crossed_, std::back_inserter(message.crossed), [&](const CrossImpulse& c) {
         return owner_[static_cast<std::size_t>(c.ghost)] == worker;
     });
-    foreign_.telling(worker, step_, message.number);
-    tell_in_order(worker, to_neighbour_);
-}
-
-void BoundedExchange::tell_in_order(std::uint32_t to, const WorkerMessage& message) {
-    std::vector<std::uint8_t> bytes = encode({self_, epoch_, step_}, message);
-    streams_.sent(to, bytes);
-    send_({to}, std::move(bytes), false);
+    send(to_neighbour_);
 }
 
 // Else it is far away by now.
@@ -433,10 +355,6 @@ Holdings BoundedExchange::holdings() {
         whole.push_back(std::move(flat));
     planned_.add_unfinished(world_.bodies(), whole);
     return columns_.holdings(self_, world_, owner_, costs_, place, whole);
-}
-
-std::unique_ptr<ReplicaProtocol> make_bounded_exchange(const SceneMessage& scene) {
-    return std::make_unique<BoundedExchange>(scene);
 }
 
 }  // namespace sim

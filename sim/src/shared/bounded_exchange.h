@@ -1,20 +1,23 @@
 #pragma once
+#include "world/shared_world.h"
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
 #include <vector>
 
 #include "shared/body_costs.h"
-#include "shared/neighbour_check.h"
-#include "shared/neighbour_streams.h"
+#include "shared/columns.h"
 #include "shared/neighbour_telling.h"
-#include "shared/replica.h"
-#include "shared/replica_protocol.h"
+#include "shared/scene_clock.h"
 #include "shared/shared_contacts.h"
 #include "shared/structures.h"
 
 namespace sim {
 
+/// How one worker keeps its copy of the world consistent with the others'. Uses no clock, no sockets and no load
+/// balancing. A body is own, foreign, or given (handed over, but not yet registered elsewhere: no worker steps it).
+///
 /// Every worker is at a step of its own. Its world holds its bodies; of the others' bodies those that may come
 /// near are put in as ghosts for each step, and move with them.
 ///
@@ -25,47 +28,71 @@ namespace sim {
 /// Bodies change owners at a step which all other owners have told the seller, see may_give: so it has compared with them what was found
 /// up to there, and the buyer compares what comes after. Who does not know yet of a sale tells the seller what it finds at these bodies;
 /// as soon as it knows it tells the buyer (FoundMessage). Until all have done so the buyer
-/// compares nothing of them. What a worker says that knows of a sale counts once this one knows of it, and has heard the seller up to it.
+/// compares nothing of them. As the application passes on all that is said in one order, what a worker says that knows of a sale
+/// comes when this one knows of it, too, and has heard the seller up to it.
 ///
 /// A contact between bodies of two owners is resolved by both (SharedContacts), and workers whose bodies touch keep closer to
 /// each other (touching_lead).
-class BoundedExchange final : public ReplicaProtocol {
+class BoundedExchange {
 public:
     explicit BoundedExchange(const SceneMessage& scene);
 
-    using ReplicaProtocol::take;
-    void take(const MessageHeader& header, NeighbourMessage&& message) override;
-    void take(const MessageHeader& header, FoundMessage&& message) override;
-    void take(const MessageHeader& header, const HeardMessage& message) override;
-    void take(SnapshotMessage&& message) override;
-    void members(const Members& message, std::uint32_t epoch) override;
-    void own(const Ownership& ownership, std::uint32_t epoch) override;
-    // Who came to the last step by taking bodies over has to say so, and where it is who goes on to a step in which bodies come.
-    [[nodiscard]] bool owes() const override {
+    /// How encoded messages leave, to the application; to be set before anything else.
+    using Send = std::function<void(std::vector<std::uint8_t>&&)>;
+    void send_by(Send send) { send_ = std::move(send); }
+    /// What another worker reports of a step: its header, the seconds of a step, the number of its bodies.
+    using Report = std::function<void(const MessageHeader&, double smoothed_s, std::uint32_t own)>;
+    void report_to(Report report) { report_ = std::move(report); }
+
+    /// What another worker says, once the application has checked it (NeighbourCheck).
+    void take(const MessageHeader& header, NeighbourMessage&& message);
+    void take(const MessageHeader& header, FoundMessage&& message);
+    /// Once, before the first step of one who joins late.
+    void take(const MessageHeader& header, const PastMessage& message);
+    /// The members now, and the epoch in which the application says so. Workers that left own nothing from here on;
+    /// Ownership messages say who owns their bodies.
+    void members(const Members& message, std::uint32_t epoch);
+    /// Registered owners, in this epoch. Becomes effective at the message's step: this worker may have to take over
+    /// bodies that are some steps away.
+    void own(const Ownership& ownership, std::uint32_t epoch);
+    /// Bodies came to this worker after its last step, which nobody has published of them. Who came to the last step by
+    /// taking bodies over has to say so, and where it is who goes on to a step in which bodies come.
+    [[nodiscard]] bool owes() const {
         return published_ < step_ && (owned_.empty() ? owners_.contains(self_) : at_end());
     }
-    [[nodiscard]] bool ready() const override;
-    void step(const StepChannel& channel) override;
-    void publish(std::uint32_t epoch, const StepReport& report) override;
-    void follow() override;
-    [[nodiscard]] Holdings holdings() override;
-    [[nodiscard]] bool may_give() const override;
-    [[nodiscard]] bool all_have_heard() override;
-    void ask_again() override;
-    [[nodiscard]] std::uint64_t steps_of(std::uint32_t worker) const override { return known(worker); }
-    [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies) override;
-    void weigh() override { costs_.add(world_, owned_); }
-    [[nodiscard]] std::uint64_t steps_done() const override { return step_; }
-    [[nodiscard]] bool at_end() const override { return step_ >= settings_.steps; }
-    [[nodiscard]] bool done() const override { return at_end() && settled_; }
-    [[nodiscard]] int own_bodies() const override { return static_cast<int>(owned_.size()); }
-    [[nodiscard]] bool has_nothing() const override {
-        return owned_.empty() && later_.empty() && !owners_follow_;
-    }
-    [[nodiscard]] int lead() const override;
-    [[nodiscard]] int ghost_age() const override { return ghost_age_; }
-    [[nodiscard]] const World& world() const override { return world_; }
-    void use_threads(int threads) override { world_.use_threads(threads); }
+
+    /// Whether the next step can be done now: its inputs have arrived and the bound allows it. False if
+    /// done(), or if no body is own.
+    [[nodiscard]] bool ready() const;
+    void step();  ///< requires ready()
+    /// Sends the messages of the step just done. Called once after step(), and where it owes().
+    void publish(std::uint32_t epoch, const StepReport& report);
+    /// Without own bodies: advances as far as the others' messages allow.
+    void follow();
+
+    [[nodiscard]] Holdings holdings();  ///< who has what where, for load balancing
+    /// Whether what is own may be given: all is known that others found at it up to this step.
+    [[nodiscard]] bool may_give() const;
+    /// That another worker has done, as far as is known.
+    [[nodiscard]] std::uint64_t steps_of(std::uint32_t worker) const { return known(worker); }
+    /// Stops owning: their exact records at the end of this worker's last step. The caller sends the
+    /// Handover.
+    [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies);
+    /// After a step: notes what each own body costs, for load balancing.
+    void weigh() { costs_.add(world_, owned_); }
+
+    [[nodiscard]] std::uint64_t steps_done() const { return step_; }  ///< by this worker
+    [[nodiscard]] bool at_end() const { return step_ >= settings_.steps; }
+    /// Nothing is left to do. One more publication follows the last step, once all others have done theirs:
+    /// corrected by the impulses that arrived late.
+    [[nodiscard]] bool done() const { return at_end() && settled_; }
+    [[nodiscard]] int own_bodies() const { return static_cast<int>(owned_.size()); }
+    /// No body is own, or will be in some steps.
+    [[nodiscard]] bool has_nothing() const { return owned_.empty() && later_.empty() && !owners_follow_; }
+    [[nodiscard]] int lead() const;                             ///< steps ahead of the slowest owner, now
+    [[nodiscard]] int ghost_age() const { return ghost_age_; }  ///< of the oldest used in the last step
+    [[nodiscard]] const SharedWorld& world() const { return world_; }
+    void use_threads(int threads) { world_.use_threads(threads); }  ///< see World::use_threads
 
 private:
     struct Felt {                   // what other bodies of this worker do to an own one
@@ -93,18 +120,7 @@ private:
     void tell(int body, Update& update);
     void see(int body, const WorldBodyState& state, bool asleep);
     void pack(std::size_t which);
-    template <typename Check>
-    static void checked(const MessageHeader& header, Check check) {
-        try {
-            check();
-        } catch (const DecodeError& wrong) {
-            throw PeerError(header.worker, wrong.what());
-        }
-    }
     [[nodiscard]] bool is_told(int body) const;
-    void hear_all();
-    void hear(const MessageHeader& header, NeighbourMessage&& message);
-    void hear(const MessageHeader& header, FoundMessage&& message);
     void take_around(const Ownership& ownership);
     void bought(std::vector<int>&& bodies, std::uint32_t epoch);
     void complete();
@@ -113,10 +129,7 @@ private:
     }
     void see_own();
     [[nodiscard]] std::vector<WorldRecord> coming() const;
-    void tell_in_order(std::uint32_t to, const WorkerMessage& message);
-    void send(std::uint32_t to, const WorkerMessage& message, bool by_application) const {
-        send_({to}, encode({self_, epoch_, step_}, message), by_application);
-    }
+    void send(const WorkerMessage& message) const { send_(encode({self_, epoch_, step_}, message)); }
     [[nodiscard]] std::uint64_t known(std::uint32_t worker) const {
         const auto found = known_.find(worker);
         return found == known_.end() ? 0 : found->second;
@@ -135,10 +148,11 @@ private:
     [[nodiscard]] bool is_waited_for() const;
     [[nodiscard]] bool owns_any(std::uint32_t worker) const;
 
+    Send send_;
+    Report report_;
     std::uint32_t self_, epoch_ = 0;
     DistributedSettings settings_;
-    NeighbourCheck check_;
-    World world_;
+    SharedWorld world_;
     SceneClock clock_;
     BodyCosts costs_;
     ColumnWatch columns_;
@@ -160,14 +174,6 @@ private:
     std::map<std::uint32_t, std::uint64_t>
         begun_;          // workers that owned nothing before: step in which they got bodies
     bool late_ = false;  // others were under way before this one came
-    NeighbourStreams streams_;
-    std::map<std::uint32_t, std::uint32_t>
-        asked_up_to_;  // workers: number of a message that they may not have heard
-    struct Sold {
-        std::uint32_t epoch, from;
-        std::uint64_t step;
-    };
-    std::vector<Sold> sold_;  // by others, that have not been heard up to there
     std::vector<Later> later_;
     std::vector<ForeignBall> balls_;
     std::vector<int> near_;

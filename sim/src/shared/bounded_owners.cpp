@@ -3,7 +3,7 @@
 
 #include "shared/bounded_exchange.h"
 
-// Who owns what in bounded pace: what the application says of it, bodies that come here and go, and what has to be known for that.
+// Who owns what: what the application says of it, bodies that come here and go, and what has to be known for that.
 
 namespace sim {
 namespace {
@@ -17,16 +17,14 @@ void BoundedExchange::members(const Members& message, std::uint32_t epoch) {
     for (const std::uint32_t was : members_) {
         if (std::ranges::find(message.workers, was) != message.workers.end()) continue;
         known_[was] = kForever;
-        telling_.remove(was), streams_.remove(was);
-        std::erase_if(sold_, [was](const Sold& sold) { return sold.from == was; });
+        telling_.remove(was);
         for (Purchase& purchase : purchases_) purchase.silent.erase(was);
     }
     members_ = message.workers;
     complete();
-    hear_all();
     for (const std::uint32_t worker : members_) {
         if (worker == self_ || telling_.has(worker)) continue;
-        telling_.add(worker), streams_.add(worker);
+        telling_.add(worker);
         if (step_ == 0 && !late_) continue;
         see_own();  // it has to know how far this one is
         auto& told = std::get<NeighbourMessage>(to_neighbour_);
@@ -73,9 +71,6 @@ void BoundedExchange::own(const Ownership& ownership, std::uint32_t epoch) {
     }
     owners_ = {owner_.begin(), owner_.end()};
     std::ranges::sort(bodies);
-    // (Who got bodies at that step has found nothing before.)
-    if (changes && telling_.has(from) && told(from) < ownership.step && !begins_at(from, ownership.step))
-        sold_.push_back({epoch, from, ownership.step});
     if (owner == self_) {
         take_around(ownership);
         if (changes) {
@@ -88,11 +83,9 @@ void BoundedExchange::own(const Ownership& ownership, std::uint32_t epoch) {
     } else if (telling_.has(owner)) {
         see_own();
         telling_.got(owner, ownership.bodies, epoch);
-        if (changes)
-            tell_in_order(owner, FoundMessage{streams_.next_number(owner), epoch, foreign_.found_at(bodies)});
+        if (changes) send(FoundMessage{owner, epoch, foreign_.found_at(bodies)});
     }
     list();
-    hear_all();
 }
 
 // Without bodies that are there: on to the first that come, but not past anybody.
@@ -184,19 +177,16 @@ bool BoundedExchange::begins_at(std::uint32_t worker, std::uint64_t step) const 
     return begun != begun_.end() && begun->second >= step;
 }
 
-// What others have not told of own bodies for so long would be forgotten here before it is compared. And what another one has not heard
-// is kept.
+// What others have not told of own bodies for so long would be forgotten here before it is compared.
 bool BoundedExchange::is_waited_for() const {
-    bool waits = std::ranges::any_of(purchases_, [this](const Purchase& p) {
+    return std::ranges::any_of(purchases_, [this](const Purchase& p) {
         return p.step && *p.step + static_cast<std::uint64_t>(comparison_steps(settings_.bound)) <= step_;
     });
-    telling_.each([&](std::uint32_t worker) { waits = waits || streams_.is_full(worker); });
-    return waits;
 }
 
 // What others found up to this step at own bodies is known and compared.
 bool BoundedExchange::may_give() const {
-    return sold_.empty() && all_is_told(step_) &&
+    return all_is_told(step_) &&
            std::ranges::none_of(purchases_, [](const Purchase& p) { return p.step.has_value(); });
 }
 

@@ -12,6 +12,7 @@
 
 #include "shared/body_costs.h"
 #include "sim/distributed_world.h"
+#include "world/shared_world.h"
 
 namespace sim {
 
@@ -94,7 +95,7 @@ public:
     /// Mean diameter of bodies [m].
     [[nodiscard]] double side() const noexcept { return columns_.side(); }
     /// `owner`: of each body, kApplication for none; `place`: centre of a body of the world [m]; `structures`: see there.
-    [[nodiscard]] Holdings holdings(std::uint32_t self, const World& world,
+    [[nodiscard]] Holdings holdings(std::uint32_t self, const SharedWorld& world,
                                     std::span<const std::uint32_t> owner, const BodyCosts& costs,
                                     const std::function<Eigen::Vector3d(int)>& place,
                                     const std::vector<std::vector<int>>& structures = {});

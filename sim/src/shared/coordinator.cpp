@@ -13,9 +13,9 @@ constexpr std::uint64_t kGatherEvery = 2;  // steps
 
 }  // namespace
 
-// A record of 128 modes has 2163 bytes; a contact of 8 points 266; what is told of a constraint of 3 points 252.
+// A record of 128 modes has 2163 bytes, an impulse between two bodies 33, the number of a constraint that broke 4.
 std::int64_t largest_message(const WorldScene& scene) {
-    constexpr std::size_t kRest = 1 << 20, kBody = 8192, kConstraint = 320, kLargest = 256 << 20;
+    constexpr std::size_t kRest = 1 << 20, kBody = 8192, kConstraint = 8, kLargest = 256 << 20;
     const std::size_t bodies = scene.world.bodies.size() + scene.later.size();
     return static_cast<std::int64_t>(
         std::min(kLargest, kRest + kBody * bodies + kConstraint * scene.world.constraints.size()));
@@ -30,51 +30,20 @@ std::string Coordinator::name(std::uint32_t worker) {
 }
 
 Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& settings,
-                         DistributedObserver& observer, const RunState* from)
+                         DistributedObserver& observer)
     : scene_(scene),
       settings_(settings),
       observer_(&observer),
-      view_(scene, settings.pace),
+      view_(scene),
       columns_(scene),
-      lots_(joined_lots(scene)) {
-    const World all = with_later(scene);
+      planned_(scene, columns_.side(), structure_outlook(settings.bound, scene.world.settings.dt)),
+      lots_(joined_lots(scene)),
+      check_(with_later(scene), scene.world.constraints.size(), settings.steps) {
+    const SharedWorld all = with_later(scene);
     for (int i = 0; i < all.bodies(); ++i)
         bodies_.push_back({kApplication, view_.clock().born(i), all.record(i), 0});
-    // In lockstep a run that goes on shares out as from its start.
-    first_places_ = places(lots_);
-    if (from) go_to(*from);
-    result_.one_owner = settings_.pace == Pace::bounded &&
-                        !are_alike(all, lots_, structures(view_.world(), there_now(), columns_.side()));
+    result_.one_owner = !are_alike(all, lots_, structures(view_.world(), there_now(), columns_.side()));
     if (result_.one_owner) settings_.market.trade = false;
-    if (settings_.pace == Pace::lockstep) return;
-    check_.emplace(all, scene_.world.constraints.size(), settings_.steps);
-    planned_.emplace(scene_, columns_.side(), structure_outlook(settings_.bound, scene_.world.settings.dt));
-}
-
-void Coordinator::go_to(const RunState& from) {
-    goes_on_ = true;
-    WorldSnapshot world = from.world;
-    if (settings_.pace == Pace::lockstep)
-        for (const auto& [worker, impulse] : from.outside) world.outside += impulse;
-    view_.jump(world);
-    for (const WorldRecord& record : from.world.bodies) {
-        Body& body = bodies_[static_cast<std::size_t>(record.body)];
-        body.record = record, body.step = from.world.step;
-    }
-    if (settings_.pace == Pace::bounded) outside_ = from.outside;
-    result_ = from.result;
-    for (const QuarantinedBody& q : std::exchange(result_.quarantined, {})) quarantined_[q.body] = q;
-    for (const FirstStep& first : std::exchange(result_.limited, {})) limited_[first.number] = first.step;
-    for (const FirstStep& first : std::exchange(result_.broken, {})) broken_[first.number] = first.step;
-}
-
-RunState Coordinator::state() const {
-    RunState state{view_.snapshot(), result_, outside_};
-    if (settings_.pace == Pace::lockstep)
-        state.outside[0] = std::exchange(state.world.outside, Eigen::Vector3d::Zero());
-    state.result.steps = view_.step();
-    name_mishaps(state.result);
-    return state;
 }
 
 void Coordinator::send(std::vector<std::uint32_t> to, const WorkerMessage& message) {
@@ -85,7 +54,7 @@ void Coordinator::send(std::vector<std::uint32_t> to, const WorkerMessage& messa
 
 std::vector<Coordinator::Outgoing> Coordinator::outgoing() {
     for (const std::uint32_t worker : std::exchange(gone_, {}))
-        senders_[worker].decoded = {}, senders_[worker].reach = {};
+        senders_[worker].decoded = {}, senders_[worker].told = {};
     return std::exchange(queue_, {});
 }
 
@@ -111,7 +80,6 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
     send({worker}, SceneMessage{worker, scene_, settings_});
     observer_->note(name(worker) + " joins" + (request.host.empty() ? "" : " from " + request.host));
     members_.push_back(worker);
-    senders_[worker].address = request.address;
     result_.workers = std::max(result_.workers, static_cast<int>(members_.size()));
     if (finished_) {
         send({worker}, EndOfRun{});
@@ -129,11 +97,13 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
     return worker;
 }
 
-// A snapshot at the view's step and everything published of later ones. In lockstep a record that came with
-// ownership must not be known before the contacts that were published with it.
+// What has been up to the view's step, then who owns what.
 void Coordinator::catch_up(std::uint32_t worker) {
-    send({worker}, SnapshotMessage{view_.snapshot(), {sales_.begin(), sales_.end()}});
-    for (const auto& [step, bytes] : kept_) queue_.push_back({{worker}, bytes});
+    PastMessage past{{}, {sales_.begin(), sales_.end()}};
+    for (std::size_t c = 0; c < scene_.world.constraints.size(); ++c)
+        if (!view_.world().constraint_holds(static_cast<int>(c)))
+            past.broken.push_back(static_cast<std::uint32_t>(c));
+    send({worker}, past);
     std::vector<int> all;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i)
         if (view_.clock().moves(i) && owner(i) != kApplication) all.push_back(i);
@@ -142,14 +112,6 @@ void Coordinator::catch_up(std::uint32_t worker) {
 
 void Coordinator::start() {
     started_ = true;
-    if (goes_on_) {
-        observer_->at(0, World(scene_.world));
-        WorldSnapshot snapshot = view_.snapshot();
-        for (const std::uint32_t member : members_) {
-            if (settings_.pace == Pace::bounded) snapshot.outside = outside_[member];
-            send({member}, SnapshotMessage{snapshot});
-        }
-    }
     observer_->at(view_.step(), view_.world());
     tell_ready();
     send(members_, Members{members_, true});
@@ -162,8 +124,7 @@ void Coordinator::start() {
         const std::vector<std::uint32_t> stay = staying(), &owners = stay.empty() ? members_ : stay;
         const int workers = settings_.all_to_first ? 1 : static_cast<int>(owners.size());
         const std::vector<std::vector<int>> lots = whole_lots();
-        const std::vector<int> first = first_owners(
-            columns_, lots, settings_.pace == Pace::lockstep ? first_places_ : places(lots), workers);
+        const std::vector<int> first = first_owners(columns_, lots, places(lots), workers);
         std::vector<std::vector<int>> bodies(owners.size());
         for (std::size_t i = 0; i < lots.size(); ++i) {
             auto& mine = bodies[static_cast<std::size_t>(first[i])];
@@ -218,7 +179,7 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
         Ownership message = ownership(group);
         message.from = from;
         message.traded = traded;
-        if (settings_.pace == Pace::bounded && from != kApplication) {
+        if (from != kApplication) {
             while (!sales_.empty() &&
                    sales_.front().step + static_cast<std::uint64_t>(kept_steps(settings_.bound)) <
                        view_.step())
@@ -268,13 +229,12 @@ std::vector<std::vector<int>> Coordinator::flat_structures_now() const {
     std::vector<std::vector<int>> found =
         flat_structures(view_.world(), there_now(), columns_.side(),
                         structure_outlook(settings_.bound, scene_.world.settings.dt));
-    planned_->add_unfinished(view_.world().bodies(), found);
+    planned_.add_unfinished(view_.world().bodies(), found);
     return found;
 }
 
-// In bounded pace what a structure joins is one.
+// What a structure joins is one.
 std::vector<std::vector<int>> Coordinator::whole_lots() const {
-    if (settings_.pace == Pace::lockstep) return lots_;
     std::vector<int> first(lots_.size());
     if (!result_.one_owner) {
         std::vector<std::vector<int>> whole = flat_structures_now();
@@ -354,9 +314,8 @@ std::vector<std::uint32_t> Coordinator::staying() const {
 void Coordinator::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     leaving_.erase(worker);
-    for (auto* waits : {&asked_, &bought_})
-        std::erase_if(
-            *waits, [worker](const auto& w) { return w.first.first == worker || w.first.second == worker; });
+    std::erase_if(bought_,
+                  [worker](const auto& w) { return w.first.first == worker || w.first.second == worker; });
     for (Body& body : bodies_)
         if (body.asked_to == worker) body.asked_at = 0, body.asked_to = kApplication;
     gone_.push_back(worker);
@@ -377,11 +336,15 @@ void Coordinator::lose(std::uint32_t worker, const std::string& why) {
 }
 
 void Coordinator::note_waiting() {
-    for (auto* waits : {&asked_, &bought_})
-        for (auto& [who, for_long] : *waits) for_long = true;
+    for (auto& [who, for_long] : bought_) for_long = true;
 }
 
-// In bounded pace who holds that one up by telling it nothing, see asked_.
+// Whether a member has told another one of all steps that it has published.
+bool Coordinator::has_told(std::uint32_t worker, std::uint32_t other) {
+    Sender& sender = senders_[worker];
+    return sender.told[other] >= sender.step;
+}
+
 void Coordinator::lose_slowest(const std::string& why) {
     const Body* oldest = nullptr;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
@@ -392,17 +355,13 @@ void Coordinator::lose_slowest(const std::string& why) {
     }
     if (!oldest) return;
     std::uint32_t worker = oldest->owner;
-    const auto has_asked = [this](std::uint32_t from, std::uint32_t to) {
-        const auto asked = asked_.find({from, to});
-        return asked != asked_.end() && asked->second;
-    };
     for (std::set<std::uint32_t> seen = {worker};;) {
         const auto next = std::ranges::find_if(members_, [&](std::uint32_t to) {
             if (seen.contains(to)) return false;
             const auto bought = bought_.find({worker, to});
-            // Who sold may wait for an answer of the buyer.
-            return has_asked(worker, to) ||
-                   (bought != bought_.end() && bought->second && !has_asked(to, worker));
+            // Who sold may wait for what the buyer has not told it.
+            return !has_told(to, worker) ||
+                   (bought != bought_.end() && bought->second && has_told(worker, to));
         });
         if (next == members_.end()) break;
         worker = *next;
@@ -417,16 +376,11 @@ void Coordinator::advance() {
     while (started_ && !finished_) {
         if (settings_.until_rest && view_.at_rest()) return end(true);
         if (view_.step() >= settings_.steps) return end(false);
-        if (settings_.pace == Pace::bounded) release();
+        release();
         if (!view_.advance()) return;
-        const World& world = view_.world();
-        if (settings_.pace == Pace::lockstep)
-            observer_->done(view_.step(), [this] { return state(); });
-        else
-            gather(), ask_who_leaves();
-        observer_->at(view_.step(), world);
+        gather(), ask_who_leaves();
+        observer_->at(view_.step(), view_.world());
         tell_ready();
-        std::erase_if(kept_, [this](const auto& kept) { return kept.first <= view_.step(); });
     }
 }
 
@@ -507,7 +461,6 @@ void Coordinator::end(bool rest) {
     result_.rest_reached = rest;
     result_.counts = view_.world().counts();
     name_mishaps(result_);
-    result_.outside_impulse = view_.world().outside_impulse();  // in bounded pace zero
     for (const auto& [worker, impulse] : outside_) result_.outside_impulse += impulse;
     send(members_, EndOfRun{});
 }

@@ -18,15 +18,13 @@ namespace sim {
 /// Coordinator of a shared world, without clock or transport: keeps membership and the register of owners,
 /// passes messages on, and assembles the view of the whole world. All workers hear of members, owners and what was published
 /// in one order: a worker is a member for all or for none, and each body has one owner. What workers tell each
-/// other of a step, and within one, goes from one to the other; to those that cannot be reached it is passed on here.
+/// other is passed on here, in the order in which it came, once it is known that it can be.
 ///
 /// Bodies that do not move have no owner. Bodies that are added later have owners from the start, effective
 /// from the step before which they are added.
 class Coordinator {
 public:
-    /// `from`: the run goes on from there.
-    Coordinator(const WorldScene& scene, const DistributedSettings& settings, DistributedObserver& observer,
-                const RunState* from = nullptr);
+    Coordinator(const WorldScene& scene, const DistributedSettings& settings, DistributedObserver& observer);
 
     using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
     struct Outgoing {
@@ -44,10 +42,10 @@ public:
     void lose(std::uint32_t worker,
               const std::string& why);  ///< its bodies go to the others; its later messages are dropped
     /// Removes the member whose bodies hold up the others: the one that owns a body of which the oldest state
-    /// is known; or, if that one asked another for what it has not heard, and has no answer, or waits for bodies of another, that
+    /// is known; or, if another one published steps of which it told that one nothing, or that one waits for bodies of another, that
     /// other. What else it has said, or published again, does not count.
     void lose_slowest(const std::string& why);
-    /// Some time before that: who has no answer by then, and gets none, waits for it.
+    /// Some time before that: who waits for bodies by then, and gets none, waits for the seller.
     void note_waiting();
     /// Steps that all bodies have done.
     [[nodiscard]] std::uint64_t steps() const noexcept { return view_.step(); }
@@ -55,8 +53,7 @@ public:
     [[nodiscard]] const std::vector<std::uint32_t>& members() const noexcept { return members_; }
     [[nodiscard]] bool is_member(std::uint32_t worker) const;
     [[nodiscard]] bool finished() const noexcept { return finished_; }  ///< all steps are done
-    /// elapsed_s is that of the state which the run went on from.
-    [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }
+    [[nodiscard]] const DistributedResult& result() const noexcept { return result_; }  ///< without times
     /// Owner by the register; kApplication: none.
     [[nodiscard]] std::uint32_t owner(int body) const {
         return bodies_[static_cast<std::size_t>(body)].owner;
@@ -75,14 +72,14 @@ private:
     struct Sender {
         std::uint64_t step = 0, bytes = 0;  ///< last published; sent since
         bool refused = false;               ///< something, and it was noted
-        bool settled = false;               ///< bounded: has published the last step again
+        bool settled = false;               ///< has published the last step again
         std::uint64_t messages_at = 0;      ///< steps of all bodies since which these were sent:
         std::size_t messages = 0, message_bytes = 0, offered = 0;  ///< offered: to it, to be answered
         std::uint64_t got = 0;                                     ///< step at which it got bodies last
         std::optional<std::pair<std::uint32_t, std::uint32_t>>
-            offer;            ///< its own, to be answered: to whom, number
-        std::string address;  ///< see JoinRequest
-        ReachMessage reach;
+            offer;  ///< its own, to be answered: to whom, number
+        std::map<std::uint32_t, std::uint64_t>
+            told;                ///< other members, and of which step they were told last
         DecodedMessage decoded;  ///< the last, for its storage
     };
     struct Group {
@@ -95,22 +92,16 @@ private:
     [[nodiscard]] static std::string name(std::uint32_t worker);
     void take_message(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                       WorkerMessage& message);
-    void take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes, StateMessage&& message);
     void take_update(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                      const UpdateMessage& message);
     void take_last(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                    const StateMessage& message);
     void extend_sleep(const MessageHeader& header);
     void take_handover(const MessageHeader& header, Handover&& message);
-    void take_reach(const MessageHeader& header, ReachMessage&& message);
-    void take_relay(const MessageHeader& header, RelayMessage&& message);
-    [[nodiscard]] bool note_asked(std::uint32_t worker, std::uint32_t other, bool again);
-    [[nodiscard]] bool is_for_others(const DecodedMessage& part) const;
-    void take_dealing(const MessageHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
+    void pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes, std::uint32_t to);
+    [[nodiscard]] bool has_told(std::uint32_t worker, std::uint32_t other);
     void report(const MessageHeader& header, const StepReport& report, std::size_t records,
                 std::size_t bytes);
-    void pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes,
-                 const StateMessage& states);
     void refuse(std::uint32_t worker, const std::string& why);
     void expel(std::uint32_t worker, const std::string& why);
     [[nodiscard]] bool is_too_much(Sender& sender, std::size_t bytes) const;
@@ -123,7 +114,6 @@ private:
     void take_offer(const MessageHeader& header, std::span<const std::uint8_t> bytes, const Offer& offer);
     void take_answer(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                      const OfferAnswer& answer);
-    [[nodiscard]] bool own_contacts(std::uint32_t worker, const StateMessage& message) const;
     static void publish(Body& body, const WorldRecord& record, std::uint64_t step);
 
     void remove(std::uint32_t worker);
@@ -150,8 +140,6 @@ private:
     [[nodiscard]] bool ask_for(std::uint32_t body, std::uint32_t to);
     void end(bool rest);
     void name_mishaps(DistributedResult& result) const;
-    void go_to(const RunState& from);
-    [[nodiscard]] RunState state() const;
 
     void send(std::vector<std::uint32_t> to, const WorkerMessage& message);
 
@@ -160,31 +148,26 @@ private:
     DistributedObserver* observer_;
     WorldView view_;
     Columns columns_;
-    std::optional<PlannedStructures> planned_;
-    std::vector<std::vector<int>> lots_;         // tied together
-    std::vector<Eigen::Vector3d> first_places_;  // of each
+    PlannedStructures planned_;
+    std::vector<std::vector<int>> lots_;  // tied together
     std::vector<Body> bodies_;
     std::vector<std::uint32_t> gone_;  // whose messages need no storage any more
     std::vector<std::uint32_t> members_;
     std::set<std::uint32_t> leaving_;  // of these
     std::map<std::uint32_t, Sender> senders_;
     std::uint32_t next_worker_ = 0, epoch_ = 0;
-    bool started_ = false, finished_ = false, goes_on_ = false;
+    bool started_ = false, finished_ = false;
     std::vector<Outgoing> queue_;
-    std::optional<NeighbourCheck> check_;
-    std::deque<PastSale> sales_;  // bounded: see SnapshotMessage
-    /// Bounded: who asked whom for what it has not heard of it, and has no answer; whether that was so for long, see note_waiting.
-    std::map<std::pair<std::uint32_t, std::uint32_t>, bool> asked_;
-    /// Bounded: who waits for bodies that it bought of whom; likewise.
+    NeighbourCheck check_;
+    std::deque<PastSale> sales_;  // see PastMessage
+    /// Who waits for bodies that it bought of whom; whether that was so for long, see note_waiting.
     std::map<std::pair<std::uint32_t, std::uint32_t>, bool> bought_;
-    /// Lockstep: state messages for workers that join later, of steps that the view has not reached.
-    std::deque<std::pair<std::uint64_t, std::shared_ptr<const std::vector<std::uint8_t>>>> kept_;
     /// Mishaps as workers told them first, by body or constraint.
     std::map<int, QuarantinedBody> quarantined_;
     std::map<int, std::uint64_t> limited_, broken_;
     std::vector<std::pair<std::uint32_t, std::vector<int>>>
         orphans_;  // by the lost worker that owned them; if none was left
-    std::map<std::uint32_t, Eigen::Vector3d> outside_;  // bounded: of each worker since its start
+    std::map<std::uint32_t, Eigen::Vector3d> outside_;  // of each worker since its start
     DistributedResult result_;
 };
 

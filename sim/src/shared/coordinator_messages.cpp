@@ -1,30 +1,12 @@
 #include <algorithm>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "shared/coordinator.h"
-#include "shared/replica_protocol.h"
-#include "contact/manifold.h"
 
 // What members say.
 
 namespace sim {
-namespace {
-
-bool is_of_one_machine(const std::string& address) {
-    return address.starts_with("127.") || address == "::1";
-}
-
-/// Whether a worker whose connection comes from this address can listen there.
-bool may_listen(const std::string& address, const std::string& endpoint) {
-    if (address.empty()) return endpoint.starts_with("ipc://");
-    const bool six = address.find(':') != std::string::npos;
-    return endpoint.starts_with("tcp://" + (six ? "[" + address + "]" : address) + ":");
-}
-
-}  // namespace
-
 void Coordinator::refuse(std::uint32_t worker, const std::string& why) {
     ++result_.refused_messages;
     const auto sender = senders_.find(worker);
@@ -39,16 +21,14 @@ void Coordinator::expel(std::uint32_t worker, const std::string& why) {
 }
 
 // Between two steps of all bodies a member does at most `bound` + 1 steps, and makes or answers an offer for each
-// step of each member; in lockstep it publishes a step again when it gets bodies of a lost one. What is relayed or kept
-// for later members is bounded by this.
+// step of each member. What is relayed is bounded by this.
 bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
     constexpr std::size_t kMessages = 256, kRepeated = 8;
     const auto steps = static_cast<std::size_t>(settings_.bound) + 2;
     if (std::exchange(sender.messages_at, view_.step()) != view_.step())
         sender.messages = sender.message_bytes = sender.offered = 0;
     sender.message_bytes += bytes;
-    const std::size_t parts = settings_.pace == Pace::lockstep ? most_parts(scene_) : 0;
-    return ++sender.messages > kMessages + parts + 8 * steps * members_.size() + sender.offered ||
+    return ++sender.messages > kMessages + 8 * steps * members_.size() + sender.offered ||
            sender.message_bytes > kRepeated * steps * static_cast<std::size_t>(largest_message(scene_));
 }
 
@@ -74,17 +54,23 @@ void Coordinator::take(std::uint32_t worker, std::span<const std::uint8_t> bytes
 void Coordinator::take_message(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                                WorkerMessage& message) {
     const std::uint32_t worker = header.worker;
-    if (auto* state = std::get_if<StateMessage>(&message))
-        return take_state(header, bytes, std::move(*state));
+    if (const auto* last = std::get_if<StateMessage>(&message)) return take_last(header, bytes, *last);
     if (auto* update = std::get_if<UpdateMessage>(&message)) return take_update(header, bytes, *update);
     if (auto* handover = std::get_if<Handover>(&message)) return take_handover(header, std::move(*handover));
     if (const auto* offer = std::get_if<Offer>(&message)) return take_offer(header, bytes, *offer);
     if (const auto* answer = std::get_if<OfferAnswer>(&message)) return take_answer(header, bytes, *answer);
-    if (auto* reach = std::get_if<ReachMessage>(&message)) return take_reach(header, std::move(*reach));
-    if (auto* relay = std::get_if<RelayMessage>(&message)) return take_relay(header, std::move(*relay));
+    if (const auto* told = std::get_if<NeighbourMessage>(&message)) {
+        check_.check(header, *told);
+        if (is_member(told->to)) senders_[worker].told[told->to] = header.step;
+        return pass_on(header, bytes, told->to);
+    }
+    if (const auto* found = std::get_if<FoundMessage>(&message)) {
+        check_.check(header, *found);
+        return pass_on(header, bytes, found->to);
+    }
     if (std::holds_alternative<Beat>(message)) return;
     if (const auto* failure = std::get_if<WorkerFailure>(&message)) return lose(worker, failure->what);
-    if (std::holds_alternative<Leaves>(message) && settings_.pace == Pace::bounded) {
+    if (std::holds_alternative<Leaves>(message)) {
         if (!leaving_.insert(worker).second) return;
         if (!started_) return send({worker}, Gather{kApplication, {}});  // it gets nothing
         return ask_who_leaves();
@@ -97,59 +83,6 @@ void Coordinator::take_message(const MessageHeader& header, std::span<const std:
     refuse(worker, "found a message that no worker sends, expected one of a worker");
 }
 
-void Coordinator::take_relay(const MessageHeader& header, RelayMessage&& message) {
-    const DecodedMessage part = decode_message(message.part);
-    if (part.header.worker != header.worker || part.header.step > settings_.steps ||
-        part.header.epoch > epoch_ || !is_for_others(part))
-        return expel(header.worker, "found a message to others that no worker tells another");
-    std::vector<std::uint32_t> to;
-    for (const std::uint32_t member : members_)
-        if (member != header.worker && std::ranges::find(message.to, member) != message.to.end())
-            to.push_back(member);
-    if (const auto* heard = std::get_if<HeardMessage>(&part.message))
-        std::erase_if(to,
-                      [&](std::uint32_t other) { return !note_asked(header.worker, other, heard->again); });
-    if (!to.empty()) queue_.push_back({std::move(to), shared(message.part)});
-}
-
-// Whether the other one is to hear of it: not who has not answered yet. Who was asked may answer as often.
-bool Coordinator::note_asked(std::uint32_t worker, std::uint32_t other, bool again) {
-    if (again) return asked_.try_emplace({worker, other}, false).second;
-    if (asked_.erase({other, worker}) > 0) --senders_[worker].messages;
-    return true;
-}
-
-// Whether workers tell each other such, at this pace. Throws DecodeError if it cannot be.
-bool Coordinator::is_for_others(const DecodedMessage& part) const {
-    if (settings_.pace == Pace::lockstep) return std::holds_alternative<PartMessage>(part.message);
-    if (const auto* told = std::get_if<NeighbourMessage>(&part.message))
-        return check_->check(part.header, *told), true;
-    if (const auto* found = std::get_if<FoundMessage>(&part.message))
-        return check_->check(part.header, *found), true;
-    return std::holds_alternative<HeardMessage>(part.message);
-}
-
-// Tells those to whom it may tell its steps, and it of them.
-void Coordinator::take_reach(const MessageHeader& header, ReachMessage&& message) {
-    Sender& here = senders_[header.worker];
-    if ((settings_.pace == Pace::lockstep && !settings_.together) || !here.reach.endpoint.empty())
-        return refuse(header.worker, "found a link that nobody waits for");
-    // Behind a translation of addresses nobody finds it; and a member must not have others connect to somebody else.
-    if (!may_listen(here.address, message.endpoint)) return;
-    here.reach = std::move(message);
-    PeersMessage all;
-    for (const std::uint32_t other : members_) {
-        const auto& [there, address] = std::tie(senders_[other].reach, senders_[other].address);
-        if (other == header.worker || there.endpoint.empty() || address.empty() != here.address.empty() ||
-            is_of_one_machine(address) != is_of_one_machine(here.address))
-            continue;
-        const Secret says = make_secret(), hears = make_secret();
-        all.peers.push_back({other, there.endpoint, there.key, says, hears});
-        send({other}, PeersMessage{{{header.worker, here.reach.endpoint, here.reach.key, hears, says}}});
-    }
-    if (!all.peers.empty()) send({header.worker}, all);
-}
-
 void Coordinator::take_offer(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                              const Offer& offer) {
     const std::uint32_t worker = header.worker;
@@ -160,27 +93,26 @@ void Coordinator::take_offer(const MessageHeader& header, std::span<const std::u
     }
     if (is_member(offer.to)) ++senders_[offer.to].offered;
     senders_[worker].offer = {offer.to, offer.number};
-    take_dealing(header, bytes, offer.to);
+    pass_on(header, bytes, offer.to);
 }
 
 // The seller goes on to the step after the one that the buyer says it is at.
 void Coordinator::take_answer(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                               const OfferAnswer& answer) {
-    const bool bounded = settings_.pace == Pace::bounded;
     const Sender& buyer = senders_[header.worker];
-    if (bounded && header.step > std::max(buyer.step, buyer.got) + 1)
+    if (header.step > std::max(buyer.step, buyer.got) + 1)
         return expel(header.worker, "found a step that it has not published");
     if (!is_member(answer.to)) return;  // it has left meanwhile
     std::optional<std::pair<std::uint32_t, std::uint32_t>>& offer = senders_[answer.to].offer;
     if (offer != std::pair(header.worker, answer.number)) return;  // nobody waits for it
     offer.reset();
-    if (answer.accepted && bounded) bought_[{header.worker, answer.to}] = false;
-    take_dealing(header, bytes, answer.to);
+    if (answer.accepted) bought_[{header.worker, answer.to}] = false;
+    pass_on(header, bytes, answer.to);
 }
 
-void Coordinator::take_dealing(const MessageHeader& header, std::span<const std::uint8_t> bytes,
-                               std::uint32_t to) {
-    if (to == header.worker) return refuse(header.worker, "found a dealing with itself");
+void Coordinator::pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes,
+                          std::uint32_t to) {
+    if (to == header.worker) return refuse(header.worker, "found a message to itself");
     if (is_member(to)) queue_.push_back({{to}, shared(bytes)});  // else it has left meanwhile
 }
 
@@ -219,41 +151,10 @@ bool Coordinator::owns_constraint(std::uint32_t worker, int constraint) const {
     return owns(worker, static_cast<std::uint32_t>(first));
 }
 
-// Contacts and constraints travel with their first body that moves.
-bool Coordinator::own_contacts(std::uint32_t worker, const StateMessage& message) const {
-    const auto bodies = static_cast<int>(bodies_.size());
-    const auto planes = static_cast<int>(scene_.world.planes.size());
-    const bool contacts =
-        std::all_of(message.contacts.begin(), message.contacts.end(), [&](const ContactRecord& c) {
-            const bool b = c.b >= kFirstPlane ? c.b - kFirstPlane < planes : c.b < bodies;
-            if (c.a < 0 || c.a >= bodies || c.b <= c.a || !b) return false;
-            const int first = view_.clock().moves(c.a) ? c.a : c.b;
-            return owns(worker, static_cast<std::uint32_t>(first));
-        });
-    return contacts &&
-           std::all_of(message.springs.begin(), message.springs.end(),
-                       [&](const SpringRecord& s) { return owns_constraint(worker, s.constraint); });
-}
-
 void Coordinator::publish(Body& body, const WorldRecord& record, std::uint64_t step) {
     if (step < body.step) return;
     body.record = record;
     body.step = step;
-}
-
-void Coordinator::take_state(const MessageHeader& header, std::span<const std::uint8_t> bytes,
-                             StateMessage&& message) {
-    if (settings_.pace == Pace::bounded) return take_last(header, bytes, message);
-    if (settings_.pace != Pace::lockstep || header.step == 0 || header.step > view_.step() + 1 ||
-        !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
-        return expel(header.worker, "found states that are not its to publish");
-    if (!own_contacts(header.worker, message))
-        return expel(header.worker, "found contacts that are not its to publish");
-    for (const WorldRecord& record : message.bodies)
-        publish(bodies_[static_cast<std::size_t>(record.body)], record, header.step);
-    report(header, message.report, message.bodies.size(), bytes.size());
-    pass_on(header, bytes, message);
-    view_.take(header.step, std::move(message));
 }
 
 void Coordinator::take_update(const MessageHeader& header, std::span<const std::uint8_t> bytes,
@@ -264,8 +165,7 @@ void Coordinator::take_update(const MessageHeader& header, std::span<const std::
     });
     const bool constraints = std::ranges::all_of(
         message.broken, [&](std::uint32_t c) { return owns_constraint(header.worker, static_cast<int>(c)); });
-    if (settings_.pace != Pace::bounded || !own || !constraints || !fits(message.report.mishaps) ||
-        header.step <= senders_[header.worker].step)
+    if (!own || !constraints || !fits(message.report.mishaps) || header.step <= senders_[header.worker].step)
         return expel(header.worker, "found states that are not its to publish");
     for (const std::uint32_t c : message.broken) view_.break_constraint(static_cast<int>(c));
     for (const Update& update : message.bodies) {
@@ -285,8 +185,8 @@ void Coordinator::take_update(const MessageHeader& header, std::span<const std::
 void Coordinator::take_last(const MessageHeader& header, std::span<const std::uint8_t> bytes,
                             const StateMessage& message) {
     Sender& sender = senders_[header.worker];
-    if (header.step != settings_.steps || header.step != sender.step || !message.contacts.empty() ||
-        !message.springs.empty() || !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
+    if (header.step != settings_.steps || header.step != sender.step ||
+        !fits(header.worker, message.bodies) || !fits(message.report.mishaps))
         return expel(header.worker, "found states that are not its to publish");
     sender.settled = true;
     for (const WorldRecord& record : message.bodies)
@@ -313,13 +213,7 @@ void Coordinator::take_handover(const MessageHeader& header, Handover&& message)
     if (!fits(header.worker, message.bodies))
         return refuse(header.worker, "found bodies that are not its to hand over");
     std::vector<int> bodies;
-    for (const WorldRecord& record : message.bodies) {
-        // In lockstep what is handed over was published before, with its contacts.
-        if (settings_.pace == Pace::lockstep &&
-            header.step > bodies_[static_cast<std::size_t>(record.body)].step)
-            return refuse(header.worker, "found bodies that it has not published");
-        bodies.push_back(record.body);
-    }
+    for (const WorldRecord& record : message.bodies) bodies.push_back(record.body);
     std::sort(bodies.begin(), bodies.end());
     if (std::adjacent_find(bodies.begin(), bodies.end()) != bodies.end())
         return refuse(header.worker, "found a body twice");
@@ -344,26 +238,6 @@ void Coordinator::take_handover(const MessageHeader& header, Handover&& message)
     advance();
 }
 
-// Who owns something does the steps itself.
-void Coordinator::pass_on(const MessageHeader& header, std::span<const std::uint8_t> bytes,
-                          const StateMessage& states) {
-    const auto copy = shared(bytes);
-    std::vector<std::uint32_t> with, without;
-    std::set<std::uint32_t> owners;
-    for (const Body& body : bodies_) owners.insert(body.owner);
-    for (const std::uint32_t member : members_)
-        if (member != header.worker) (owners.contains(member) ? with : without).push_back(member);
-    if (!without.empty()) queue_.push_back({std::move(without), copy});
-    kept_.emplace_back(header.step, copy);
-    if (with.empty()) return;
-    PublishedMessage published{states.report, {}};
-    published.report.mishaps.clear();
-    for (const WorldRecord& record : states.bodies)
-        published.bodies.push_back(static_cast<std::uint32_t>(record.body));
-    queue_.push_back(
-        {std::move(with), std::make_shared<const std::vector<std::uint8_t>>(encode(header, published))});
-}
-
 void Coordinator::report(const MessageHeader& header, const StepReport& report, std::size_t records,
                          std::size_t bytes) {
     Sender& sender = senders_[header.worker];
@@ -375,8 +249,7 @@ void Coordinator::report(const MessageHeader& header, const StepReport& report, 
     step.processor_s = report.processor_s;
     step.bodies = static_cast<int>(report.own);
     step.lead = static_cast<int>(report.lead), step.ghost_age = static_cast<int>(report.ghost_age);
-    step.bytes = std::exchange(sender.bytes, 0) + report.linked;
-    result_.bytes += report.linked, result_.bytes_linked += report.linked;
+    step.bytes = std::exchange(sender.bytes, 0);
     step.cross_contacts = static_cast<int>(report.cross_contacts);
     result_.cpu_s += report.processor_s;
     result_.cross_contacts += report.cross_contacts;
@@ -384,7 +257,7 @@ void Coordinator::report(const MessageHeader& header, const StepReport& report, 
     result_.records += records;
     result_.largest_lead = std::max(result_.largest_lead, step.lead);
     result_.largest_ghost_age = std::max(result_.largest_ghost_age, step.ghost_age);
-    if (settings_.pace == Pace::bounded) outside_[header.worker] = report.outside_impulse;
+    outside_[header.worker] = report.outside_impulse;
     for (const Mishap& m : report.mishaps) {
         const int number = static_cast<int>(m.number);
         if (m.kind == Mishap::Kind::quarantined)

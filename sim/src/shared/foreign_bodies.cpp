@@ -20,7 +20,7 @@ void coast(WorldBodyState& s, const Eigen::Vector3d& inertia, double time) {
 
 }  // namespace
 
-ForeignBodies::ForeignBodies(World& world, std::uint32_t self, int bodies, int keep_steps)
+ForeignBodies::ForeignBodies(SharedWorld& world, std::uint32_t self, int bodies, int keep_steps)
     : world_(&world),
       self_(self),
       dt_(world.settings().dt),
@@ -35,7 +35,7 @@ ForeignBodies::Heard* ForeignBodies::slot(std::uint32_t worker, std::uint64_t st
     Heard& slot = slots[step % keep_];
     if (slot.step > step) return nullptr;
     if (std::exchange(slot.step, step) != step) {
-        slot.there = false, slot.heard = slot.own_number = 0;
+        slot.there = false, slot.heard = 0;
         slot.bodies.clear(), slot.crossed.clear();
     }
     return &slot;
@@ -50,10 +50,6 @@ const ForeignBodies::Heard* ForeignBodies::heard(std::uint32_t worker, std::uint
 
 void ForeignBodies::keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed) {
     if (Heard* own = slot(self_, step)) own->crossed = crossed, own->there = true;
-}
-
-void ForeignBodies::telling(std::uint32_t worker, std::uint64_t step, std::uint32_t number) {
-    if (Heard* heard = slot(worker, step)) heard->own_number = number;
 }
 
 void ForeignBodies::nothing_until(std::uint32_t worker, std::uint64_t step) {
@@ -198,17 +194,17 @@ const ForeignBodies::Ghost& ForeignBodies::at(int body, std::uint64_t now) {
     return ghost_;
 }
 
-// What blows of steps before the told state gave the body, and its owner did not know by then: where the own one's number is lower
+// What rebounds of steps before the told state gave the body, and its owner did not know by then: where the own one's number is lower
 // what was found here counts, instead of what was found there (SharedContacts).
 void ForeignBodies::add_owed(int body) {
     const auto slots = heard_.find(told_.worker);
     if (slots == heard_.end()) return;
-    const auto blow = [](const CrossImpulse& c) { return c.blow; };
+    const auto rebound = [](const CrossImpulse& c) { return c.rebound; };
     for (std::uint64_t step = told_.step, left = keep_; step > 0 && left > 0; --step, --left) {
         const Heard& theirs = slots->second[step % keep_];
-        if (theirs.step != step || theirs.own_number <= told_.heard) return;  // it knew
+        if (theirs.step != step || step <= told_.heard) return;  // it knew
         const Heard* own = heard(self_, step);
-        if (!own || (std::ranges::none_of(own->crossed, blow) && std::ranges::none_of(theirs.crossed, blow)))
+        if (!own || (std::ranges::none_of(own->crossed, rebound) && std::ranges::none_of(theirs.crossed, rebound)))
             continue;
         StepImpulse owed;
         const auto find = [](const std::vector<CrossImpulse>& crossed, int one, int other) {
@@ -217,7 +213,7 @@ void ForeignBodies::add_owed(int body) {
             return at == crossed.end() ? nullptr : &*at;
         };
         const auto owes = [&](const CrossImpulse* here, const CrossImpulse* there) {
-            if (!(here && here->blow) && !(there && there->blow)) return;
+            if (!(here && here->rebound) && !(there && there->rebound)) return;
             if (here) owed.linear -= here->linear, owed.angular += here->angular_ghost;
             if (there) owed.linear -= there->linear, owed.angular -= there->angular_own;
         };

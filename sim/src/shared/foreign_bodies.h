@@ -1,4 +1,5 @@
 #pragma once
+#include "world/shared_world.h"
 #include <map>
 #include <memory>
 #include <vector>
@@ -11,19 +12,18 @@ namespace sim {
 /// a stack swing each other up (tests/sim/shared/shared_stack_test.cpp).
 constexpr int kHeldSteps = 32;
 
-/// What one worker has heard of the others in bounded pace: their messages of the last steps, and from them the states of
+/// What one worker has heard of the others: their messages of the last steps, and from them the states of
 /// those of their bodies that are near at any step near these.
 class ForeignBodies {
 public:
     /// `world` provides body kinds and the step of free motion; its state is not changed.
-    ForeignBodies(World& world, std::uint32_t self, int bodies, int keep_steps);
+    ForeignBodies(SharedWorld& world, std::uint32_t self, int bodies, int keep_steps);
 
     /// What a worker said of a step. Own messages hold only `crossed`.
     struct Heard {
         std::uint64_t step = 0;
         bool there = false;       ///< its message has come, or none will
-        std::uint32_t heard = 0;  ///< number of the last message of this worker that it had heard by then
-        std::uint32_t own_number = 0;  ///< of this worker's message to it of the step; 0: none
+        std::uint64_t heard = 0;  ///< step of this worker's last message that it had heard by then
         PackedUpdates bodies;
         std::vector<CrossImpulse> crossed;
     };
@@ -31,8 +31,6 @@ public:
     void take(std::uint32_t worker, std::uint64_t step, NeighbourMessage&& message,
               const std::vector<std::uint32_t>& owner);
     void keep_own(std::uint64_t step, const std::vector<CrossImpulse>& crossed);
-    /// A worker is told of own bodies in a step, by the message of this number.
-    void telling(std::uint32_t worker, std::uint64_t step, std::uint32_t number);
     /// Of a worker's steps up to this one nothing more will come but what add() takes.
     void nothing_until(std::uint32_t worker, std::uint64_t step);
     /// What a worker found in a step, beside what it has told of that.
@@ -77,7 +75,8 @@ private:
     struct Told {
         std::uint64_t step = 0;
         Update update;
-        std::uint32_t worker = kApplication, heard = 0;  ///< who told it, see Heard
+        std::uint32_t worker = kApplication;  ///< who told it
+        std::uint64_t heard = 0;              ///< see Heard
     };
     struct Glance {
         Eigen::Vector3d position = Eigen::Vector3d::Zero(), velocity = position;  // [m], [m/s]
@@ -107,7 +106,7 @@ private:
     void add_owed(int body);
     void extrapolate(int body, std::uint64_t now);
 
-    World* world_;
+    SharedWorld* world_;
     std::uint32_t self_;
     double dt_, gravity_;
     std::size_t keep_;

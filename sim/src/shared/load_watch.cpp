@@ -35,9 +35,8 @@ void LoadWatch::at(const World& world) {
     const std::size_t known = velocities_.size();
     loads_.resize(kinds_->size()), velocities_.resize(bodies);
     now_.assign(bodies, {}), before_.resize(bodies), touches_.assign(bodies, {});
-    world.contact_records(contacts_);
     const WorldSettings& settings = world.settings();
-    for (const ContactRecord& c : contacts_) {
+    for (const ContactRecord& c : world.snapshot().contacts) {
         double impulse = 0;
         Eigen::Vector3d weighted = Eigen::Vector3d::Zero(), middle = Eigen::Vector3d::Zero();
         for (int p = 0; p < c.count; ++p) {

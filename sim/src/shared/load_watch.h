@@ -39,7 +39,6 @@ private:
         Eigen::Vector3d at = Eigen::Vector3d::Zero();  // its middle, body frame
     };
     std::vector<Touch> touches_;  // of each body in this step
-    std::vector<ContactRecord> contacts_;
 };
 
 /// The larger of each.

@@ -98,7 +98,7 @@ void Market::registered(std::uint32_t epoch, const Ownership& ownership) {
 
 void Market::worked(std::uint64_t step, double seconds, double work, int own) {
     Worker& self = workers_[self_];
-    if (step <= step_) {  // repeated, with more bodies: not what a step takes
+    if (step <= step_) {  // the last one, told once more: not what a step takes
         if (step == step_) mark(self, step, static_cast<float>(self.smoothed));
         return;
     }

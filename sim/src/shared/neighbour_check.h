@@ -6,7 +6,7 @@
 
 namespace sim {
 
-/// What messages of one worker to another are checked by, here and in the application, without what changes in the run.
+/// By what the application checks messages of one worker to another before it passes them on: without what changes in the run.
 class NeighbourCheck {
 public:
     /// all: the world with the bodies that come later, see with_later.

@@ -8,7 +8,7 @@
 
 namespace sim {
 
-/// Of which of its bodies one worker in bounded pace tells each other one: of those that may come near that one's, as far as it knows
+/// Of which of its bodies one worker tells each other one: of those that may come near that one's, as far as it knows
 /// where these are. What it does not name is far away. What sleeps is told once to each, when it is near, and once more when it wakes;
 /// what another one may believe wrongly is told wherever it is.
 class NeighbourTelling {

@@ -1,7 +1,6 @@
 #include <chrono>
-#include <utility>
 
-#include "shared/replica.h"
+#include "shared/scene_clock.h"
 #include "sim/distributed_world.h"
 #include "world/processor_time.h"
 
@@ -32,17 +31,14 @@ void tell_past(const World& world, DistributedResult& result) {
 }
 
 RunState state_of(const World& world, const DistributedResult& result) {
-    RunState state{world.snapshot(), result, {}};
+    RunState state{world.snapshot(), result};
     tell_past(world, state.result);
-    state.outside[0] = std::exchange(state.world.outside, Eigen::Vector3d::Zero());
     return state;
 }
 
 void go_to(const RunState& from, World& world, SceneClock& clock) {
-    WorldSnapshot snapshot = from.world;
-    for (const auto& [worker, impulse] : from.outside) snapshot.outside += impulse;
-    clock.apply(world, snapshot.step - 1);
-    world.rewind(snapshot);
+    clock.apply(world, from.world.step - 1);
+    world.rewind(from.world);
     const DistributedResult& r = from.result;
     world.recall({r.counts, r.quarantined, r.limited, r.broken});
 }

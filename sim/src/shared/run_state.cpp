@@ -3,32 +3,132 @@
 #include <string>
 
 #include "messages/world_record_codec.h"
-#include "shared/replica.h"
+#include "shared/scene_clock.h"
 #include "sim/errors.h"
 #include "contact/manifold.h"
 
 namespace sim {
 namespace {
 
-//   snapshot as in worker_messages.h
-//   f64 elapsed s, cpu s; i32 workers, lost, left, bodies reowned, largest lead, largest ghost age;
-//   u64 migrations, trades, cross contacts, bytes, bytes of states, of links, records, refused messages
+//   u64 step; lists of record (worker_messages.h), of contact and of spring; v3 outside impulse
+//   f64 elapsed s, cpu s
 //   i32 contacts, pairs, islands, asleep; u64 inverse fallbacks, deformations limited, constraints broken, impacts,
 //   solved again, held apart
 //   list of quarantined {u32 body, u64 step, text}; lists of limited and of broken {u32 number, u64 step}
-//   list of outside {u32 worker, v3 impulse}
+//
+//   contact     10 + 32 n bytes: u32 a, u32 b, u8 (1 emerging),
+//               u8 n points of {u32 feature, w3 arm, f32 normal impulse, w3 friction impulse}
+//   spring      41 bytes: u32 constraint, flag holds, 3 w3 impulses
 
-constexpr std::size_t kQuarantinedBytes = 16, kFirstBytes = 12, kOutsideBytes = 28;
+constexpr std::size_t kQuarantinedBytes = 16, kFirstBytes = 12, kSmallestContact = 10, kSpringBytes = 41;
 constexpr std::uint32_t kLongestReason = 4096;
 
-/// Every number of a result, in order; `result` may be const.
+void write_floats(ByteWriter& out, const Eigen::Vector3f& v) {
+    for (int i = 0; i < 3; ++i) out.number(v[i]);
+}
+
+float finite_float(ByteReader& in) {
+    const auto value = in.number<float>();
+    if (!std::isfinite(value)) throw DecodeError("an impulse that is not finite");
+    return value;
+}
+
+Eigen::Vector3f read_floats(ByteReader& in) {
+    Eigen::Vector3f v;
+    for (int i = 0; i < 3; ++i) v[i] = finite_float(in);
+    return v;
+}
+
+void write(ByteWriter& out, const ContactRecord& c) {
+    out.number(static_cast<std::uint32_t>(c.a));
+    out.number(static_cast<std::uint32_t>(c.b));
+    out.number<std::uint8_t>(c.emerging);
+    out.number(static_cast<std::uint8_t>(c.count));
+    for (int i = 0; i < c.count; ++i) {
+        out.number(c.points[i].feature);
+        write_floats(out, c.points[i].arm_a);
+        out.number(c.points[i].normal_impulse);
+        write_floats(out, c.points[i].friction_impulse);
+    }
+}
+
+ContactRecord read_contact(ByteReader& in) {
+    ContactRecord c;
+    const auto a = in.number<std::uint32_t>(), b = in.number<std::uint32_t>();
+    c.emerging = in.flag();
+    c.count = in.number<std::uint8_t>();
+    const bool two_bodies = a < b && b < kMostWorldBodies;
+    const bool plane = a < kMostWorldBodies && b >= kFirstPlane && b < kFirstPlane + kMostWorldBodies;
+    if (!(two_bodies || plane) || c.count > 4) throw DecodeError("a contact out of range");
+    c.a = static_cast<int>(a), c.b = static_cast<int>(b);
+    for (int i = 0; i < c.count; ++i) {
+        c.points[i].feature = in.number<std::uint32_t>();
+        c.points[i].arm_a = read_floats(in);
+        c.points[i].normal_impulse = finite_float(in);
+        c.points[i].friction_impulse = read_floats(in);
+    }
+    return c;
+}
+
+SpringRecord read_spring(ByteReader& in) {
+    SpringRecord s;
+    const auto constraint = in.number<std::uint32_t>();
+    if (constraint >= kMostWorldBodies) throw DecodeError("a constraint out of range");
+    s.constraint = static_cast<int>(constraint);
+    s.holds = in.flag();
+    for (Eigen::Vector3f& impulse : s.impulses) impulse = read_floats(in);
+    return s;
+}
+
+void write(ByteWriter& out, const std::vector<ContactRecord>& contacts) {
+    out.count(contacts.size());
+    for (const ContactRecord& c : contacts) write(out, c);
+}
+
+void write(ByteWriter& out, const std::vector<SpringRecord>& springs) {
+    out.count(springs.size());
+    for (const SpringRecord& s : springs) {
+        out.number(static_cast<std::uint32_t>(s.constraint));
+        out.number<std::uint8_t>(s.holds);
+        for (const Eigen::Vector3f& impulse : s.impulses) write_floats(out, impulse);
+    }
+}
+
+std::vector<ContactRecord> read_contact_records(ByteReader& in) {
+    std::vector<ContactRecord> contacts(in.count(kSmallestContact));
+    for (ContactRecord& c : contacts) c = read_contact(in);
+    return contacts;
+}
+
+std::vector<SpringRecord> read_spring_records(ByteReader& in) {
+    std::vector<SpringRecord> springs(in.count(kSpringBytes));
+    for (SpringRecord& s : springs) s = read_spring(in);
+    return springs;
+}
+
+void write(ByteWriter& out, const WorldSnapshot& snapshot) {
+    out.number(snapshot.step);
+    write(out, snapshot.bodies);
+    write(out, snapshot.contacts);
+    write(out, snapshot.springs);
+    out.matrix(snapshot.outside);
+}
+
+WorldSnapshot read_snapshot(ByteReader& in) {
+    WorldSnapshot snapshot;
+    snapshot.step = in.number<std::uint64_t>();
+    snapshot.bodies = read_world_records(in);
+    snapshot.contacts = read_contact_records(in);
+    snapshot.springs = read_spring_records(in);
+    in.matrix(snapshot.outside);
+    if (!snapshot.outside.allFinite()) throw DecodeError("an impulse that is not finite");
+    return snapshot;
+}
+
+/// Every number of a result of one process, in order; `result` may be const.
 template <typename Result, typename Visit>
 void visit_numbers(Result& r, Visit visit) {
     visit(r.elapsed_s), visit(r.cpu_s);
-    visit(r.workers), visit(r.lost), visit(r.left), visit(r.bodies_reowned);
-    visit(r.largest_lead), visit(r.largest_ghost_age);
-    visit(r.migrations), visit(r.trades), visit(r.cross_contacts), visit(r.bytes), visit(r.bytes_states);
-    visit(r.bytes_linked), visit(r.records), visit(r.refused_messages);
     auto& n = r.counts;
     visit(n.contacts), visit(n.pairs), visit(n.islands), visit(n.asleep);
     visit(n.inverse_fallbacks), visit(n.deformations_limited), visit(n.constraints_broken), visit(n.impacts);
@@ -114,11 +214,6 @@ RunState read_state(std::span<const std::uint8_t> bytes, const WorldScene& scene
     state.world = read_snapshot(in);
     check_fits(state.world, scene);
     read_result(in, scene, state.world, state.result);
-    for (std::uint32_t left = in.count(kOutsideBytes); left > 0; --left) {
-        Eigen::Vector3d& impulse = state.outside[in.number<std::uint32_t>()];
-        in.matrix(impulse);
-        check(impulse.allFinite(), "an impulse that is not finite");
-    }
     in.expect_end();
     return state;
 }
@@ -138,11 +233,6 @@ std::vector<std::uint8_t> encode(const RunState& state) {
     }
     write(out, r.limited);
     write(out, r.broken);
-    out.count(state.outside.size());
-    for (const auto& [worker, impulse] : state.outside) {
-        out.number(worker);
-        out.matrix(impulse);
-    }
     return std::move(out.bytes());
 }
 

@@ -18,13 +18,13 @@ const CrossImpulse* find(const std::vector<CrossImpulse>& crossed, int own, int 
 
 }  // namespace
 
-SharedContacts::SharedContacts(World& world, const ForeignBodies& heard, std::uint32_t self, Owners owners,
+SharedContacts::SharedContacts(SharedWorld& world, const ForeignBodies& heard, std::uint32_t self, Owners owners,
                                int keep)
     : world_(&world), heard_(&heard), self_(self), owners_(owners), keep_(static_cast<std::uint64_t>(keep)) {}
 
 // Which of the two counts, see the class.
 SharedContacts::Shares SharedContacts::shares(const CrossImpulse* found, const CrossImpulse* told) {
-    if (!(found && found->blow) && !(told && told->blow)) return {-0.5, 0.5};
+    if (!(found && found->rebound) && !(told && told->rebound)) return {-0.5, 0.5};
     const bool lower_here = found ? found->own < found->ghost : told->ghost < told->own;
     return lower_here ? Shares{0, 0} : Shares{-1, 1};
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include "world/shared_world.h"
 #include <map>
 #include <vector>
 
@@ -17,12 +18,12 @@ namespace sim {
     return 2 * comparison_steps(bound);
 }
 
-/// Contacts between bodies of two owners, in bounded pace. Both owners resolve them, each against the ghost that it knows, and
+/// Contacts between bodies of two owners. Both owners resolve them, each against the ghost that it knows, and
 /// tell what they found. A body that got I from its own owner's solution of a step, and I' by the other one's, is put right by
 /// (I' - I) / 2; the other body by the opposite, so momentum is kept to the last bit. (Both solve the interface and
 /// split the difference: an additive Schwarz method, here a step late: chaotic relaxation, Chazan and Miranker 1969.)
 ///
-/// A blow (a rebound) is not split: two owners may see it in different steps, and half of each would be no rebound. If either finds one
+/// A rebound is not split: two owners may see it in different steps, and half of each would be no rebound. If either finds one
 /// in a step, what the owner of the body with the lower number found in that step counts, as a whole: perhaps nothing, and then that
 /// owner meets the other body as it should be (ForeignBodies::add_owed). So what counts follows from the step alone, and whoever
 /// compares finds the same; of a body that was just bought once it has heard what others found at it (FoundMessage).
@@ -34,7 +35,7 @@ public:
         const std::vector<std::uint8_t>& awaits;  ///< it does not know that yet
         const std::vector<std::uint32_t>& owner;
     };
-    SharedContacts(World& world, const ForeignBodies& heard, std::uint32_t self, Owners owners, int keep);
+    SharedContacts(SharedWorld& world, const ForeignBodies& heard, std::uint32_t self, Owners owners, int keep);
 
     /// The own bodies and `worker` have done `step`: what both found is compared, once. `now`: steps done here.
     void compare(std::uint32_t worker, std::uint64_t step, std::uint64_t now);
@@ -56,7 +57,7 @@ private:
     void put_right(const CrossImpulse* found, const CrossImpulse* told);
     void compare(const Occasion& of, int body);
     [[nodiscard]] const PastSale* sale_after(int body, std::uint64_t step) const;
-    World* world_;
+    SharedWorld* world_;
     const ForeignBodies* heard_;
     std::uint32_t self_;
     Owners owners_;

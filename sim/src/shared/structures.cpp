@@ -30,7 +30,7 @@ struct Candidate {
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
 };
 
-Eigen::AlignedBox3d box_around(const World& world, int body, const WorldBodyState& state) {
+Eigen::AlignedBox3d box_around(const SharedWorld& world, int body, const WorldBodyState& state) {
     const GeneralizedSuperquadric& shape = world.definition(body).shape;
     Eigen::Vector3d half = Eigen::Vector3d::Constant(world.most_radius(body));
     if (shape.bumps.empty()) {
@@ -49,7 +49,7 @@ bool is_upright(const WorldBody& body, const Eigen::Quaterniond& orientation, co
 }
 
 /// Whether a body's centre is in another's box: they come one after the other, and fall from there.
-bool come_to_one_place(const World& all, const std::vector<int>& bodies) {
+bool come_to_one_place(const SharedWorld& all, const std::vector<int>& bodies) {
     std::vector<Eigen::AlignedBox3d> boxes;
     for (const int body : bodies) boxes.push_back(box_around(all, body, all.state(body)));
     for (std::size_t i = 0; i < boxes.size(); ++i)
@@ -58,13 +58,13 @@ bool come_to_one_place(const World& all, const std::vector<int>& bodies) {
     return false;
 }
 
-double slow_speed(const World& world, double size) {
+double slow_speed(const SharedWorld& world, double size) {
     return kSlowShare * std::sqrt(world.settings().gravity.norm() * size);
 }
 
 /// Joins what belongs together. Paths that are further apart along x than `near` are not asked for.
 template <typename Together>
-DisjointSets join(const World& world, std::vector<Candidate>& candidates, double near,
+DisjointSets join(const SharedWorld& world, std::vector<Candidate>& candidates, double near,
                   const Together& together) {
     std::ranges::sort(candidates, {}, [](const Candidate& c) { return std::pair(c.path.min().x(), c.body); });
     DisjointSets sets(static_cast<std::size_t>(world.bodies()));
@@ -131,7 +131,7 @@ double structure_outlook(int bound, double dt) {
     return dt * (kOutlookSteps + 2 * std::min(bound, kMostAhead));
 }
 
-std::vector<std::vector<int>> structures(const World& world, std::span<const int> bodies, double size) {
+std::vector<std::vector<int>> structures(const SharedWorld& world, std::span<const int> bodies, double size) {
     const Eigen::Vector3d up = -world.settings().gravity.normalized();
     std::vector<Candidate> slow;
     for (const int body : bodies) {
@@ -156,7 +156,7 @@ std::vector<std::vector<int>> structures(const World& world, std::span<const int
     return result;
 }
 
-std::vector<std::vector<int>> flat_structures(const World& world, std::span<const int> bodies, double size,
+std::vector<std::vector<int>> flat_structures(const SharedWorld& world, std::span<const int> bodies, double size,
                                               double within_s, std::span<const OthersBody> others) {
     const Eigen::Vector3d& gravity = world.settings().gravity;
     if (gravity.isZero()) return {};
@@ -183,15 +183,15 @@ std::vector<std::vector<int>> flat_structures(const World& world, std::span<cons
     return result;
 }
 
-World with_later(const WorldScene& scene) {
-    World world(scene.world);
+SharedWorld with_later(const WorldScene& scene) {
+    SharedWorld world(scene.world);
     for (const WorldBody& body : scene.later) (void)world.add_body(body);
     return world;
 }
 
 PlannedStructures::PlannedStructures(const WorldScene& scene, double size, double within_s) {
     if (scene.later.empty()) return;
-    const World all = with_later(scene);
+    const SharedWorld all = with_later(scene);
     std::vector<int> moving;
     for (int i = 0; i < all.bodies(); ++i)
         if (all.definition(i).moves()) moving.push_back(i);
@@ -207,7 +207,7 @@ void PlannedStructures::add_unfinished(int bodies, std::vector<std::vector<int>>
         if (planned.back() >= bodies) structures.push_back(planned);
 }
 
-bool are_alike(const World& world, const std::vector<std::vector<int>>& lots,
+bool are_alike(const SharedWorld& world, const std::vector<std::vector<int>>& lots,
                const std::vector<std::vector<int>>& structures) {
     struct Range {
         double least = std::numeric_limits<double>::infinity(), most = 0;

@@ -25,14 +25,6 @@ int lowest_free(int descriptor) noexcept {
 
 }  // namespace
 
-bool few_descriptors_left() noexcept {
-    rlimit limit{};
-    const int free = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    if (free >= 0) close(free);
-    return free < 0 ||
-           (getrlimit(RLIMIT_NOFILE, &limit) == 0 && static_cast<rlim_t>(free) >= limit.rlim_cur / 2);
-}
-
 Listening::Listening(zmq::context_t& context, zmq::socket_t& socket, const std::string& endpoint) {
     zmq::socket_t monitor(context, zmq::socket_type::pair);
     monitor.set(zmq::sockopt::linger, 0);

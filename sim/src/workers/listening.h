@@ -4,11 +4,8 @@
 
 namespace sim {
 
-/// Half of the descriptors that this process may have are open, or more: ZeroMQ ends a process that has none left.
-[[nodiscard]] bool few_descriptors_left() noexcept;
-
 /// The TCP socket on which a ZeroMQ socket listens. ZeroMQ accepts whoever connects, until this process has no
-/// descriptors left; this closes the door before, and the connections that are there stay. (A new one is dropped
+/// descriptors left, which ends it; this closes the door before, and the connections that are there stay. (A new one is dropped
 /// by a filter in the kernel, as by a firewall, so that who tries again comes in later. Where the kernel has no
 /// such filters, nothing is done.)
 class Listening {

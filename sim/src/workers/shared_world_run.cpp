@@ -10,7 +10,6 @@
 #include "shared/shared_world_worker.h"
 #include "sim/errors.h"
 #include "workers/elapsed.h"
-#include "workers/teams.h"
 #include "workers/worker_gate.h"
 #include "workers/worker_process.h"
 #include "world/processor_time.h"
@@ -35,7 +34,6 @@ public:
     WorkerHere(std::uint32_t number) : number_(number) {}
     [[nodiscard]] std::uint32_t number() const { return number_; }
 
-    /// Throws PeerError, where another worker told what cannot be.
     void take(const std::vector<std::uint8_t>& bytes) {
         const double processor = thread_processor_s();
         DecodedMessage m = decode_message(bytes);
@@ -50,49 +48,32 @@ public:
         if (!worker_ || worker_->ended()) return false;
         if (worker_->awaits_answer())
             worker_->stop_waiting_for_answer();  // messages come between its steps alone
-        if (!worker_->ready()) {
-            if (seconds_since(worked_) < ask_after_) return false;
-            worked_ = Clock::now(), ask_after_ *= 2;
-            worker_->ask_again();
-            return false;
-        }
-        const Clock::time_point start = worked_ = Clock::now();
-        ask_after_ = kAskAgain;
+        if (!worker_->ready()) return false;
+        const Clock::time_point start = Clock::now();
         const double processor = thread_processor_s();
         worker_->step();
         const double spent = std::exchange(messages_s_, 0) + thread_processor_s() - processor;
         worker_->worked({seconds_since(start), 0, spent});
         return true;
     }
-    /// To the application: what it tells others is passed on by that.
     [[nodiscard]] std::vector<std::vector<std::uint8_t>> outgoing() {
-        std::vector<std::vector<std::uint8_t>> all;
-        if (!worker_) return all;
-        for (SharedWorldWorker::Outgoing& message : worker_->outgoing())
-            all.push_back(message.to.empty()
-                              ? std::move(message.bytes)
-                              : worker_->relayed(std::move(message.to), std::move(message.bytes)));
-        return all;
+        return worker_ ? worker_->outgoing() : std::vector<std::vector<std::uint8_t>>();
     }
 
 private:
     std::uint32_t number_;
     std::optional<SharedWorldWorker> worker_;
     double messages_s_ = 0;  ///< processor time that they took since the last step
-    Clock::time_point worked_ = Clock::now();
-    double ask_after_ = kAskAgain;  ///< [s]
 };
 
 class SharedWorldRun {
 public:
     SharedWorldRun(const WorldScene& scene, const DistributedSettings& settings,
-                   const DistributedLaunch& launch, DistributedObserver& observer, const RunState* from)
-        : settings_(settings),
-          launch_(launch),
+                   const DistributedLaunch& launch, DistributedObserver& observer)
+        : launch_(launch),
           processes_(launch.processes.program.empty() ? 0 : launch.processes.count),
           observer_(observer),
-          meeting_(scene, settings, observer, from),
-          teams_(meeting_, launch.verify, observer),
+          meeting_(scene, settings, observer),
           gate_(gate_settings(scene, settings, launch)) {
         if (launch.listening)
             launch.listening(launch.listen.empty() ? gate_.private_endpoint() : gate_.endpoint());
@@ -108,12 +89,11 @@ public:
         wait_for_workers();
         started_ = true;
         progressed_ = Clock::now();
-        teams_.start();
+        meeting_.start();
         const Clock::time_point start = Clock::now();
         while (!meeting_.finished()) advance();
         DistributedResult result = meeting_.result();
-        teams_.count(result);
-        result.elapsed_s += seconds_since(start);
+        result.elapsed_s = seconds_since(start);
         result.refused_messages += gate_.refused_messages() + gate_.refused_keys();
         end_children();
         return result;
@@ -174,7 +154,7 @@ private:
     void wait_for_workers() {
         const auto wanted = static_cast<std::size_t>(std::max({launch_.expect, processes_, 1}));
         const Clock::time_point start = Clock::now();
-        while (teams_.members() + ended_early_ < wanted) {
+        while (meeting_.members().size() + ended_early_ < wanted) {
             for (WorkerGate::Event& event : gate_.wait(kWait)) take(event);
             look_after_children();
             pass_on();
@@ -185,9 +165,10 @@ private:
 
     /// A worker that is stopped, or cannot reach us, does not hold up those that came.
     void go_without_the_rest(std::size_t wanted) {
-        const std::string joined = std::to_string(teams_.members()) + " of " + std::to_string(wanted) +
-                                   " workers joined within " + seconds(launch_.wait_s);
-        if (teams_.members() == 0 && children_.empty()) throw WorkerError(joined);
+        const std::string joined = std::to_string(meeting_.members().size()) + " of " +
+                                   std::to_string(wanted) + " workers joined within " +
+                                   seconds(launch_.wait_s);
+        if (meeting_.members().size() == 0 && children_.empty()) throw WorkerError(joined);
         for (Child& child : children_)
             if (!child.worker && !child.ended) child.process.kill();
         observer_.note(joined + ": the run begins without the others");
@@ -198,36 +179,28 @@ private:
         if (event.kind == Kind::asks_to_join)
             join(event);
         else if (event.kind == Kind::message)
-            teams_.take(event.worker, event.bytes);
-        else if (teams_.is_member(event.worker)) {
+            meeting_.take(event.worker, event.bytes);
+        else if (meeting_.is_member(event.worker)) {
             lost_.push_back(event.worker);
-            teams_.lose(event.worker, event.why);
+            meeting_.lose(event.worker, event.why);
         }
     }
 
     void join(const WorkerGate::Event& event) {
-        if (settings_.pace == Pace::lockstep && event.request.fingerprint != step_fingerprint()) {
-            gate_.refuse(event.stranger,
-                         "another processor, mathematics library or build: lockstep would "
-                         "not be to the bit");
-            observer_.note("a worker of " + event.request.host +
-                           " was refused: its processor, mathematics library or build differs");
-            return;
-        }
         const auto child = std::find_if(children_.begin(), children_.end(), [&](const Child& c) {
             return !c.worker && !c.ended && c.process.secret() == event.request.secret;
         });
-        const bool place = child != children_.end() || teams_.members() < kMostWorkers;
-        const std::optional<std::uint32_t> worker = place ? teams_.join(event.request) : std::nullopt;
-        if (!worker) return gate_.refuse(event.stranger, "all places are taken");
-        gate_.admit(event.stranger, *worker, event.request.secret);
-        admitted_.push_back(*worker);
+        if (child == children_.end() && meeting_.members().size() >= kMostWorkers)
+            return gate_.refuse(event.stranger, "all places are taken");
+        const std::uint32_t worker = meeting_.join(event.request);
+        gate_.admit(event.stranger, worker, event.request.secret);
+        admitted_.push_back(worker);
         if (child != children_.end()) child->worker = worker;
     }
 
     void look_after_children() {
         for (Child& child : children_) {
-            if (child.worker && !teams_.is_member(*child.worker) && was_lost(*child.worker))
+            if (child.worker && !meeting_.is_member(*child.worker) && was_lost(*child.worker))
                 child.process.kill();
             if (!child.process.has_ended()) continue;
             if (!child.ended) {
@@ -239,8 +212,8 @@ private:
             }
             // One that ended in order may have said so: that is on its way.
             const bool settled = child.process.was_killed() || seconds_since(*child.ended) > kLastWords_s;
-            if (settled && child.worker && teams_.is_member(*child.worker))
-                teams_.lose(*child.worker, child.process.ending());
+            if (settled && child.worker && meeting_.is_member(*child.worker))
+                meeting_.lose(*child.worker, child.process.ending());
         }
     }
 
@@ -256,7 +229,7 @@ private:
     }
 
     void take_over() {
-        here_.emplace(meeting_.join({step_fingerprint(), {}, "here"}));
+        here_.emplace(meeting_.join({{}, "here"}));
         observer_.note("no worker is left: the application goes on by itself");
     }
 
@@ -268,21 +241,15 @@ private:
                 for (const std::vector<std::uint8_t>& bytes : here_->outgoing())
                     meeting_.take(here_->number(), bytes), meeting_.advance(), more = true;
         }
-        for (const Coordinator::Outgoing& out : teams_.outgoing()) gate_.send(out.to, out.bytes);
         std::erase_if(admitted_, [this](std::uint32_t worker) {
-            if (teams_.is_member(worker)) return false;
+            if (meeting_.is_member(worker)) return false;
             gate_.dismiss(worker);
             return true;
         });
     }
 
     void deliver(Coordinator::Outgoing& out) {
-        if (here_ && std::erase(out.to, here_->number()) > 0) try {
-                here_->take(*out.bytes);
-            } catch (const PeerError& wrong) {
-                meeting_.lose(wrong.worker, std::string("it told another what cannot be: ") + wrong.what());
-            }
-        teams_.address(out);
+        if (here_ && std::erase(out.to, here_->number()) > 0) here_->take(*out.bytes);
         if (!out.to.empty()) gate_.send(out.to, std::move(out.bytes));
     }
 
@@ -305,12 +272,10 @@ private:
             std::this_thread::sleep_for(2ms);
     }
 
-    const DistributedSettings settings_;
     const DistributedLaunch launch_;
     const int processes_;  ///< started here
     DistributedObserver& observer_;
     Coordinator meeting_;
-    Teams teams_;
     WorkerGate gate_;
     std::vector<std::uint32_t> admitted_;  ///< by the gate, now
     std::vector<std::uint32_t> lost_;      ///< silent or out of reach
@@ -327,22 +292,13 @@ private:
 }  // namespace
 
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
-                                  const DistributedLaunch& launch, DistributedObserver& observer,
-                                  const RunState* from) {
+                                  const DistributedLaunch& launch, DistributedObserver& observer) {
     check_scene(scene);
     check_settings(settings);
     if (launch.processes.count < 0 || launch.processes.count > kMostWorkers)
         throw InputError("", std::to_string(launch.processes.count) + " workers",
                          "0 to " + std::to_string(kMostWorkers));
-    if (launch.verify < 1 || (launch.verify > 1 && settings.pace != Pace::lockstep))
-        throw InputError("", std::to_string(launch.verify) + " workers that check each other",
-                         "1 or more, and lockstep");
-    if (from && settings.pace != Pace::lockstep) throw InputError("", "a state out of step", "lockstep");
-    DistributedSettings own = settings;
-    own.market.trade =
-        settings.market.trade && launch.verify == 1;         // times differ, and so would their offers
-    own.together = settings.together && launch.verify == 1;  // who check each other compute for themselves
-    return SharedWorldRun(scene, own, launch, observer, from).run();
+    return SharedWorldRun(scene, settings, launch, observer).run();
 }
 
 }  // namespace sim

@@ -2,14 +2,10 @@
 
 #include <unistd.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
-#include <filesystem>
 
 #include "sim/errors.h"
 
@@ -18,7 +14,6 @@ namespace {
 
 constexpr const char* kPrefix = "/musicworld-";
 constexpr const char* kSocket = "/workers";
-constexpr const char* kPeer = "/peer-";   // and its process
 constexpr std::size_t kLongestPath = 99;  // a Unix socket's path has 107 characters at most
 
 /// Of `endpoint`, if SocketFolder made it; else empty.
@@ -30,15 +25,9 @@ std::string folder_of(const std::string& endpoint) {
     return folder.rfind('/') == folder.rfind(kPrefix) ? folder : std::string();
 }
 
-/// With its sockets, and nothing else.
+/// With its socket, and nothing else.
 void remove_folder(const std::string& folder) noexcept {
-    try {
-        for (const auto& entry : std::filesystem::directory_iterator(folder))
-            if (const std::string name = "/" + entry.path().filename().string();
-                name == kSocket || name.starts_with(kPeer))
-                unlink(entry.path().c_str());
-    } catch (const std::exception&) {  // another one removed it
-    }
+    unlink((folder + kSocket).c_str());
     rmdir(folder.c_str());
 }
 
@@ -68,18 +57,6 @@ std::uint32_t application_of(const std::string& endpoint) noexcept {
         std::from_chars(digits, endpoint.data() + endpoint.size(), process);
     }
     return process;
-}
-
-std::string peer_socket(const std::string& endpoint) {
-    const std::string folder = folder_of(endpoint);
-    return folder.empty() ? folder : "ipc://" + folder + kPeer + std::to_string(getpid());
-}
-
-bool is_peer_socket(const std::string& peer, const std::string& endpoint) {
-    const std::string folder = folder_of(endpoint), start = "ipc://" + folder + kPeer;
-    return !folder.empty() && peer.starts_with(start) && peer.size() > start.size() &&
-           std::all_of(peer.begin() + static_cast<std::ptrdiff_t>(start.size()), peer.end(),
-                       [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
 void remove_left_socket(const std::string& endpoint) noexcept {

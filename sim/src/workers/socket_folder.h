@@ -4,8 +4,8 @@
 
 namespace sim {
 
-/// A private folder (0700, musicworld-PROCESS-XXXXXX under TMPDIR or /tmp) for the workers' ipc sockets;
-/// removed with them at the end.
+/// A private folder (0700, musicworld-PROCESS-XXXXXX under TMPDIR or /tmp) for the workers' ipc socket;
+/// removed with it at the end.
 class SocketFolder {
 public:
     SocketFolder();  ///< throws std::runtime_error
@@ -24,12 +24,7 @@ private:
 /// it.
 [[nodiscard]] std::uint32_t application_of(const std::string& endpoint) noexcept;
 
-/// Where this process listens for other workers of that application: in the same folder; empty if SocketFolder did not make it.
-[[nodiscard]] std::string peer_socket(const std::string& endpoint);
-/// Whether `peer` is such a socket, of any process.
-[[nodiscard]] bool is_peer_socket(const std::string& peer, const std::string& endpoint);
-
-/// Removes what an application that ended abnormally left at `endpoint`: the sockets and their folder, if
+/// Removes what an application that ended abnormally left at `endpoint`: the socket and its folder, if
 /// SocketFolder made them.
 void remove_left_socket(const std::string& endpoint) noexcept;
 

@@ -111,16 +111,17 @@ Secret own_secret() {
 std::vector<std::uint8_t> join_request(const Secret& secret) {
     std::array<char, 256> host{};
     gethostname(host.data(), host.size() - 1);
-    return encode(MessageHeader{}, JoinRequest{step_fingerprint(), secret, host.data()});
+    return encode(MessageHeader{}, JoinRequest{secret, host.data()});
 }
 
 /// By the application's answer: it has a world or a play.
-int serve(const WorldLink& link, DecodedMessage&& first) {
-    if (const auto* scene = std::get_if<SceneMessage>(&first.message)) return serve_world(link, *scene);
+int serve(zmq::socket_t& socket, Pulse& pulse, int threads, DecodedMessage&& first) {
+    if (const auto* scene = std::get_if<SceneMessage>(&first.message))
+        return serve_world(socket, pulse, threads, *scene);
     if (std::holds_alternative<StruckAssign>(first.message)) {
-        link.pulse.joined(first.header.worker);
+        pulse.joined(first.header.worker);
         stop_listening_for_leave();
-        return KitWorker(link.socket, link.pulse).serve(std::move(first));
+        return KitWorker(socket, pulse).serve(std::move(first));
     }
     if (const auto* refusal = std::get_if<Refusal>(&first.message))
         std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
@@ -145,8 +146,7 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
     int status = 1;
     if (wait_for_answer(socket, pulse, frame)) {
         try {
-            status =
-                serve({context, socket, pulse, endpoint, keys, threads}, decode_message(bytes_of(frame)));
+            status = serve(socket, pulse, threads, decode_message(bytes_of(frame)));
         } catch (const DecodeError& e) {
             send(socket, encode({}, WorkerFailure{e.what()}));
             throw WorkerError(std::string("bad message: ") + e.what());

@@ -1,6 +1,5 @@
 #include "workers/worker_gate.h"
 
-#include <arpa/inet.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -36,17 +35,6 @@ bool is(const zmq::message_t& frame, Type type) {
     std::uint16_t found = 0;
     if (is_ours(frame)) std::memcpy(&found, frame.data<std::uint8_t>() + 6, sizeof found);
     return found == static_cast<std::uint16_t>(type);
-}
-
-/// IP address of the connection by which a frame came; empty: it came by none.
-std::string address_of_peer(const zmq::message_t& frame) {
-    const char* said = zmq_msg_gets(frame.handle(), "Peer-Address");
-    std::string address = said ? said : "";
-    if (address.starts_with("::ffff:")) address.erase(0, std::strlen("::ffff:"));
-    in6_addr bytes{};
-    const bool is_one =
-        inet_pton(AF_INET, address.c_str(), &bytes) == 1 || inet_pton(AF_INET6, address.c_str(), &bytes) == 1;
-    return is_one ? address : std::string();
 }
 
 DecodedMessage decoded(const zmq::message_t& frame) {
@@ -271,7 +259,6 @@ void WorkerGate::take_from_stranger(std::string&& identity, const zmq::message_t
         if (frame.size() > kLargestOfAStranger) throw DecodeError("a stranger's message that is too long");
         DecodedMessage m = decoded(frame);
         if (auto* request = std::get_if<JoinRequest>(&m.message)) {
-            request->address = address_of_peer(frame);
             if (may_join(request->secret)) {
                 Event event;
                 event.kind = Event::Kind::asks_to_join;

@@ -26,11 +26,8 @@ TEST(WorkerOptions, WhatMakesNoSenseTogetherIsRefusedInOneLine) {
     const std::vector<std::pair<std::vector<std::string>, const char*>> cases = {
         {{"--workers", "-1"}, "--workers -1"},
         {{"--workers", "257"}, "0 to 256"},
-        {{"--mode", "async"}, "--mode async"},
         {{"--bound", "3"}, "--bound 3"},
         {{"--bound", "65"}, "0 to 64"},
-        {{"--workers", "2", "--bound", "3"}, "--bound 3 with --mode sync"},
-        {{"--workers", "2", "--mode", "fast"}, "sync or async"},
         {{"--workers", "2", "--balance", "maybe"}, "on or off"},
         {{"--keys", "k"}, "--listen ENDPOINT"},
         {{"--expect", "2"}, "--listen ENDPOINT"},
@@ -58,10 +55,9 @@ TEST(WorkerOptions, WhatMakesNoSenseTogetherIsRefusedInOneLine) {
 TEST(WorkerOptions, SayHowManyHowAndOfWhichClock) {
     EXPECT_FALSE(options_of({}));  // in this process
     EXPECT_EQ(options_of({"--listen", "tcp://127.0.0.1:0", "--expect", "4"})->count, 0);
-    EXPECT_EQ(options_of({"--workers", "2", "--mode", "async"})->bound, 4);
-    EXPECT_EQ(options_of({"--workers", "2", "--mode", "async", "--bound", "0"})->pace,
-              sim::Pace::lockstep);  // nobody may be ahead
-    EXPECT_EQ(options_of({"--workers", "2", "--mode", "async", "--bound", "16"})->pace, sim::Pace::bounded);
+    EXPECT_EQ(options_of({"--workers", "2"})->bound, 4);
+    EXPECT_EQ(options_of({"--workers", "2", "--bound", "0"})->bound, 0);
+    EXPECT_EQ(options_of({"--workers", "2", "--bound", "16"})->bound, 16);
     EXPECT_FALSE(options_of({"--workers", "2", "--balance", "off"})->balance);
     const auto options =
         options_of({"--workers", "3", "--processors", "simulated:latency=1/100,slowdown=50,cost=modelled"});

@@ -89,8 +89,8 @@ TEST(Simulate, ABodyThatComesBringsItsMomentum) {
 
 TEST(Simulate, JsonHasTheKeysThatScriptsRelyOn) {
     const json r = json::parse(format_simulate(simulate(steps_of(WrittenScene(kFalling), 7))));
-    for (const char* key : {"scene", "bodies", "steps", "dt_s", "workers", "mode", "bound", "elapsed_s",
-                            "cpu_s", "ns_per_body_step", "bytes_per_body_update", "cross_worker_contacts",
+    for (const char* key : {"scene", "bodies", "steps", "dt_s", "workers", "bound", "elapsed_s", "cpu_s",
+                            "ns_per_body_step", "bytes_per_body_update", "cross_worker_contacts",
                             "migrations", "bodies_lost", "state_hash", "momentum_drift", "energy_j"})
         EXPECT_TRUE(r.contains(key)) << key;
     EXPECT_EQ(r["steps"], 7);

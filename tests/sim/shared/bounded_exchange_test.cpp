@@ -1,3 +1,5 @@
+#include "shared/bounded_exchange.h"
+
 #include <gtest/gtest.h>
 
 #include <deque>
@@ -5,11 +7,10 @@
 #include <random>
 
 #include "falling_bodies.h"
-#include "shared/replica_protocol.h"
 #include "shared/world_view.h"
 #include "shared_scenes.h"
 
-// Workers out of step with each other, by hand: messages arrive when the test says so.
+// Workers out of step with each other, by hand: messages arrive when the test says so, those from one and those to one in order.
 
 namespace sim {
 namespace {
@@ -20,25 +21,18 @@ public:
          const std::vector<int>& owner) {
         SceneMessage scene;
         scene.scene.world = world;
-        scene.settings.pace = Pace::bounded;
         scene.settings.bound = bound;
         scene.settings.steps = steps;
         std::vector<std::uint32_t> members;
         for (int i = 0; i < workers; ++i) {
             scene.worker = static_cast<std::uint32_t>(i);
             members.push_back(scene.worker);
-            exchanges_.push_back(make_bounded_exchange(scene));
-            exchanges_.back()->send_by([this](std::vector<std::uint32_t>&& to,
-                                              std::vector<std::uint8_t>&& bytes, bool by_application) {
-                if (to.empty()) return hear_as_application(bytes);
-                for (const std::uint32_t worker : to)
-                    if (by_application)
-                        inbox_[worker].push_back({bytes, {}, 0});
-                    else if (!is_lost())
-                        linked_[worker].push_back({bytes, {}, 0});
+            exchanges_.push_back(std::make_unique<BoundedExchange>(scene));
+            exchanges_.back()->send_by([this, i](std::vector<std::uint8_t>&& bytes) {
+                outbox_[static_cast<std::size_t>(i)].push_back({std::move(bytes), {}, 0});
             });
         }
-        inbox_.resize(static_cast<std::size_t>(workers)), linked_.resize(inbox_.size()),
+        inbox_.resize(static_cast<std::size_t>(workers)), outbox_.resize(inbox_.size()),
             waits_.resize(inbox_.size());
         for (auto& e : exchanges_) e->members({members}, 0);
         for (int w = 0; w < workers; ++w) {
@@ -57,7 +51,7 @@ public:
         for (const auto& [seller, sale] : agreed_)
             if ((seller == w || sale.buyer == w) && exchanges_[w]->steps_done() >= sale.step) return false;
         if (waits_[w] > 0 || !exchanges_[w]->ready()) return false;
-        exchanges_[w]->step({});
+        exchanges_[w]->step();
         age_ = std::max(age_, exchanges_[w]->ghost_age());
         exchanges_[w]->publish(known_epoch_[w], {});
         return true;
@@ -86,32 +80,23 @@ public:
         ownership.from = static_cast<std::uint32_t>(seller);
         ownership.traded = true, ownership.step = exchanges_[seller]->steps_done();
         ownership.bodies = sold.bodies;
-        ++epoch_, ++waits_[seller], ++waits_[buyer];
-        for (std::size_t w = 0; w < inbox_.size(); ++w) {
-            ownership.around.clear(), ownership.around_step.clear();
-            for (const auto& [other, published] : published_)
-                if (w == buyer && other != body) {
-                    ownership.around.push_back(published.second);
-                    ownership.around_step.push_back(published.first);
-                }
-            inbox_[w].push_back({{}, ownership, epoch_});
-        }
+        ++waits_[seller], ++waits_[buyer];
+        outbox_[seller].push_back({{}, ownership, 0});
         return true;
     }
-    /// All that has come by the application and on links; or, where these are slow, some of it.
+    /// All that this one has sent, and that has come to it; or, where either is slow, some of it.
     void deliver(std::size_t w) {
-        for (std::size_t left = some_of(inbox_[w].size(), slow_); left > 0; --left) take_next(w, inbox_[w]);
-        for (std::size_t left = some_of(linked_[w].size(), slow_links_); left > 0; --left)
-            take_next(w, linked_[w]);
+        for (std::size_t left = some_of(outbox_[w].size(), slow_there_); left > 0; --left) pass_on(w);
+        for (std::size_t left = some_of(inbox_[w].size(), slow_back_); left > 0; --left) take_next(w);
     }
-    void slow(bool application, bool links) { slow_ = application, slow_links_ = links; }
-    /// From now on one in so many messages between workers is lost; 0: none. Who gets no further asks again.
-    void lose_one_in(unsigned many) { one_in_ = many; }
+    /// The ways to the application and from there.
+    void slow(bool there, bool back) { slow_there_ = there, slow_back_ = back; }
     /// All messages, then a step of each; the first worker does `more` besides, as far as it may.
     void run_in_turn(int more) {
         for (bool any = true; any;) {
             any = false;
             for (std::size_t w = 0; w < exchanges_.size(); ++w) deliver(w);
+            for (std::size_t w = 0; w < exchanges_.size(); ++w) deliver(w);  // what was passed on, too
             for (std::size_t w = 0; w < exchanges_.size(); ++w)
                 for (int k = 0; k <= (w == 0 ? more : 0); ++k) any = step(w) || any;
         }
@@ -124,9 +109,7 @@ public:
                !std::all_of(exchanges_.begin(), exchanges_.end(), [](const auto& e) { return e->done(); }))
             for (std::size_t w = 0; w < exchanges_.size(); ++w) {
                 deliver(w);
-                bool stepped = false;
-                for (unsigned k = random() % 6; k > 0; --k) stepped = step(w) || stepped;
-                if (one_in_ > 0 && !stepped && !exchanges_[w]->done()) exchanges_[w]->ask_again();
+                for (unsigned k = random() % 6; k > 0; --k) (void)step(w);
                 if (sales > 0 && random() % static_cast<unsigned>(sales) == 0)
                     agree(w, (w + 1 + random() % 2) % exchanges_.size(),
                           static_cast<int>(random() % unsigned(exchanges_[w]->world().bodies())));
@@ -135,7 +118,7 @@ public:
         EXPECT_LT(turns, 20000) << "somebody waits for ever";
         return sold;
     }
-    ReplicaProtocol& operator[](std::size_t w) { return *exchanges_[w]; }
+    BoundedExchange& operator[](std::size_t w) { return *exchanges_[w]; }
     [[nodiscard]] Eigen::Vector3d momentum() const {
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         for (const auto& e : exchanges_)
@@ -171,18 +154,42 @@ public:
     }
 
 private:
-    [[nodiscard]] bool is_lost() { return one_in_ > 0 && losses_() % one_in_ == 0; }
     [[nodiscard]] std::size_t some_of(std::size_t count, bool slow) {
-        return slow && count > 0 ? losses_() % 2 * (losses_() % count + 1) : count;
+        return slow && count > 0 ? delays_() % 2 * (delays_() % count + 1) : count;
     }
     struct Sent {
         std::vector<std::uint8_t> bytes;
         std::optional<Ownership> sold;
         std::uint32_t epoch;
     };
-    void take_next(std::size_t w, std::deque<Sent>& inbox) {
-        const Sent sent = std::move(inbox.front());
-        inbox.pop_front();
+    /// As the application does.
+    void pass_on(std::size_t w) {
+        Sent sent = std::move(outbox_[w].front());
+        outbox_[w].pop_front();
+        if (sent.sold) return register_sale(*sent.sold);
+        DecodedMessage message = decode_message(sent.bytes);
+        if (const auto* told = std::get_if<NeighbourMessage>(&message.message))
+            inbox_[told->to].push_back(std::move(sent));
+        else if (const auto* found = std::get_if<FoundMessage>(&message.message))
+            inbox_[found->to].push_back(std::move(sent));
+        else
+            publish(message);
+    }
+    void register_sale(Ownership sold) {
+        ++epoch_;
+        for (std::size_t w = 0; w < inbox_.size(); ++w) {
+            sold.around.clear(), sold.around_step.clear();
+            for (const auto& [other, published] : published_)
+                if (w == sold.owner && other != sold.bodies[0].body) {
+                    sold.around.push_back(published.second);
+                    sold.around_step.push_back(published.first);
+                }
+            inbox_[w].push_back({{}, sold, epoch_});
+        }
+    }
+    void take_next(std::size_t w) {
+        const Sent sent = std::move(inbox_[w].front());
+        inbox_[w].pop_front();
         if (sent.sold) {
             known_epoch_[w] = sent.epoch;
             exchanges_[w]->own(*sent.sold, sent.epoch);
@@ -192,13 +199,10 @@ private:
         DecodedMessage message = decode_message(sent.bytes);
         if (auto* told = std::get_if<NeighbourMessage>(&message.message))
             exchanges_[w]->take(message.header, std::move(*told));
-        else if (const auto* heard = std::get_if<HeardMessage>(&message.message))
-            exchanges_[w]->take(message.header, *heard);
         else
             exchanges_[w]->take(message.header, std::get<FoundMessage>(std::move(message.message)));
     }
-    void hear_as_application(const std::vector<std::uint8_t>& bytes) {
-        const DecodedMessage message = decode_message(bytes);
+    void publish(const DecodedMessage& message) {
         const auto* update = std::get_if<UpdateMessage>(&message.message);
         if (!update) return;  // the last states
         for (const Update& body : update->bodies) {
@@ -208,22 +212,21 @@ private:
         }
     }
 
-    std::vector<std::unique_ptr<ReplicaProtocol>> exchanges_;
-    std::vector<std::deque<Sent>> inbox_, linked_;  // by the application, and directly
-    std::vector<int> waits_;                        // workers: sales that are not registered
+    std::vector<std::unique_ptr<BoundedExchange>> exchanges_;
+    std::vector<std::deque<Sent>> inbox_, outbox_;
+    std::vector<int> waits_;  // workers: sales that are not registered
     struct Agreed {
         std::size_t buyer;
         int body;
         std::uint64_t step;
     };
     std::map<std::size_t, Agreed> agreed_;  // sellers
-    bool slow_ = false, slow_links_ = false;
+    bool slow_there_ = false, slow_back_ = false;
     std::map<int, std::pair<std::uint64_t, WorldRecord>> published_;  // by body
     std::uint32_t epoch_ = 0;
     std::map<std::size_t, std::uint32_t> known_epoch_;  // by worker
     int age_ = 0;
-    unsigned one_in_ = 0;
-    std::mt19937 losses_{11};
+    std::mt19937 delays_{11};
 };
 
 /// Which of three slabs of the scene a place is in.
@@ -411,8 +414,7 @@ TEST(BoundedExchange, HeapsOfBodiesThatReboundComeToRest) {
             ball.velocity = {draw.between(-2, 2), 0, draw.between(-2, 2)};
             scene.world.bodies.push_back(ball);
         }
-        DistributedSettings settings = world_test::lockstep(240);
-        settings.pace = Pace::bounded, settings.bound = 4;
+        DistributedSettings settings = world_test::for_steps(240);
         double fastest = 0, late = 0;
         class Speeds : public world_test::Record {
         public:
@@ -446,8 +448,8 @@ TEST(BoundedExchange, UntilRestARunGoesOnWhenItsLastEventReleasesASleeper) {
     rope.name = "rope", rope.body_a = 0, rope.body_b = -1, rope.point_b = {0, 3, 0};
     scene.world.constraints = {rope};
     scene.events = {{200, {0}, 0, 0, {}}};
-    DistributedSettings settings = world_test::lockstep(2000);
-    settings.pace = Pace::bounded, settings.until_rest = true;
+    DistributedSettings settings = world_test::for_steps(2000);
+    settings.bound = 0, settings.until_rest = true;
     struct Asleep : world_test::Record {
         void at(std::uint64_t step, const World& world) override {
             if (step == 200) asleep_at_event = world.all_asleep();
@@ -481,8 +483,8 @@ TEST(BoundedExchange, BodiesThatAnEventAddsTakePartWhoeverOwnsThem) {
                 }
                 std::vector<Eigen::Vector3d> now;
             } record;
-            DistributedSettings settings = world_test::lockstep(step + 240);
-            settings.pace = Pace::bounded;
+            DistributedSettings settings = world_test::for_steps(step + 240);
+            settings.bound = 0;
             (void)simulate_processors(scene, settings, world_test::processors(workers), record);
             const World expected = world_test::alone(scene, settings.steps);
             ASSERT_EQ(record.now.size(), 5u);
@@ -497,9 +499,9 @@ TEST(BoundedExchange, NobodyBeginsBeforeAllOwnersAreKnown) {
     SceneMessage scene;
     scene.scene.world = world_test::on_floor();
     scene.scene.world.bodies = {world_test::ball({0, 1, 0}), world_test::ball({0.1, 3, 0})};
-    scene.settings.pace = Pace::bounded, scene.settings.bound = 1, scene.settings.steps = 100;
-    const auto exchange = make_bounded_exchange(scene);
-    exchange->send_by([](auto&&, auto&&, bool) {});
+    scene.settings.bound = 1, scene.settings.steps = 100;
+    const auto exchange = std::make_unique<BoundedExchange>(scene);
+    exchange->send_by([](auto&&) {});
     exchange->members({{0, 1}, true}, 1);
     for (const std::uint32_t owner : {0u, 1u}) {
         Ownership ownership;
@@ -510,7 +512,7 @@ TEST(BoundedExchange, NobodyBeginsBeforeAllOwnersAreKnown) {
     }
     exchange->members({{0, 1}, false}, 3);
     int steps = 0;
-    for (; exchange->ready() && steps < 100; ++steps) exchange->step({});
+    for (; exchange->ready() && steps < 100; ++steps) exchange->step();
     EXPECT_EQ(steps, 2);  // one ahead of who has done none, and then waits
 }
 
@@ -538,20 +540,12 @@ TEST(BoundedExchange, ABallThatFallsOnAnothersStackGainsNoEnergy) {
         }
 }
 
-// Registrations may come before or long after what workers tell each other, and that may be lost, and come once more. Of three paces of
-// both ways, with and without losses and sales, bodies that rebound and that do not.
-TEST(BoundedExchange, PilesKeepTheirMomentumHoweverMessagesComeAndBodiesAreSold) {
-    struct Way {
-        bool slow_application, slow_links;
-        unsigned lost_one_in;
-    };
+// What workers say may be long on its way, and so may what the application says, with and without sales, of bodies that rebound
+// and that do not.
+TEST(BoundedExchange, PilesKeepTheirMomentumHoweverLateMessagesComeAndBodiesAreSold) {
     int runs = 0, sold = 0;
-    for (const Way& way : {Way{false, false, 0},
-                           {true, false, 0},
-                           {false, true, 0},
-                           {true, true, 0},
-                           {false, false, 8},
-                           {true, true, 5}})
+    for (const auto& [there, back] :
+         {std::pair(false, false), std::pair(true, false), std::pair(false, true), std::pair(true, true)})
         for (const int sales : {0, 8, 1})
             for (const unsigned seed : {1u, 2u, 3u}) {
                 WorldDefinition d = sim_bench::falling_balls(27);
@@ -560,12 +554,10 @@ TEST(BoundedExchange, PilesKeepTheirMomentumHoweverMessagesComeAndBodiesAreSold)
                 for (const WorldBody& body : d.bodies)
                     owner.push_back(slab(body.world_from_body.translation().x(), d));
                 Crew crew(d, 3, seed == 2 ? 1 : 4, 200, owner);
-                crew.lose_one_in(way.lost_one_in);
-                crew.slow(way.slow_application, way.slow_links);
+                crew.slow(there, back);
                 sold += crew.run_at_random(seed + 10 * static_cast<unsigned>(++runs), sales);
                 EXPECT_LT((crew.momentum() - crew.outside()).norm(), 1e-9 * crew.weight() * 200 / 60.0)
-                    << "slow " << way.slow_application << way.slow_links << ", lost one in "
-                    << way.lost_one_in << ", sales " << sales << ", seed " << seed;
+                    << "slow " << there << back << ", sales " << sales << ", seed " << seed;
             }
     EXPECT_GT(sold, 10 * runs);
 }

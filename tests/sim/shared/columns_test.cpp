@@ -90,7 +90,7 @@ TEST(Columns, LotsAreAllThatAWorkerHasInAColumnAndWhatASaleShortensItsReturnLeng
         one = static_cast<std::uint32_t>(draw.between(0, 3));
         places.emplace_back(draw.between(0, 6), draw.between(0.5, 3), draw.between(0, 6));
     }
-    sim::World world(scene.world);
+    sim::SharedWorld world(scene.world);
     const sim::BodyCosts costs(120);
     const auto place = [&](int body) { return places[static_cast<std::size_t>(body)]; };
     const auto of = [&](std::uint32_t self) {

@@ -177,8 +177,6 @@ TEST(Market, OffersAreAFunctionOfReportsAlone) {
 
 namespace {
 
-class MarketRun : public testing::TestWithParam<sim::Pace> {};
-
 double unsteady(int worker, std::uint64_t step) {
     Draw draw(static_cast<unsigned>(1000 * worker) + static_cast<unsigned>(step));
     (void)draw.between(0, 1);
@@ -195,17 +193,9 @@ sim::WorldScene at_rest(int wide, int deep) {
     return scene;
 }
 
-sim::DistributedSettings steps_of(sim::Pace pace, std::uint64_t steps) {
-    sim::DistributedSettings settings;
-    settings.pace = pace;
-    settings.bound = pace == sim::Pace::bounded ? 4 : 0;
-    settings.steps = steps;
-    return settings;
-}
-
 /// The first offer is made at the end of step 10.
-sim::DistributedSettings all_on_one(sim::Pace pace, std::uint64_t steps) {
-    sim::DistributedSettings settings = steps_of(pace, steps);
+sim::DistributedSettings all_on_one(std::uint64_t steps) {
+    sim::DistributedSettings settings = for_steps(steps);
     settings.all_to_first = true;
     settings.market.from_step = 10;
     return settings;
@@ -244,12 +234,12 @@ private:
 
 }  // namespace
 
-TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
+TEST(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
     for (const int workers : {3, 7, 10})
         for (const int wide : {6, 20})
             for (const bool steady : {true, false}) {
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
-                const sim::DistributedSettings settings = all_on_one(GetParam(), 300);
+                const sim::DistributedSettings settings = all_on_one(300);
                 sim::SimulatedProcessors how = processors(workers);
                 how.latency_s = 2e-6;
                 if (!steady) how.factor = unsteady;
@@ -268,12 +258,12 @@ TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
 }
 
 // Who owns all does not take steps while an answer is on its way.
-TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsHoweverLongMessagesTake) {
+TEST(MarketRun, AllOnOneIsLevelWithinTenStepsHoweverLongMessagesTake) {
     for (const int workers : {3, 10, 16})
         for (const int wide : {6, 20})
             for (const double latency : {2e-4, 2e-2}) {  // a step of one takes 30 to 400 us
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
-                const sim::DistributedSettings settings = all_on_one(GetParam(), 30);
+                const sim::DistributedSettings settings = all_on_one(30);
                 sim::SimulatedProcessors how = processors(workers);
                 how.latency_s = latency;
                 Record record;
@@ -284,12 +274,12 @@ TEST_P(MarketRun, AllOnOneIsLevelWithinTenStepsHoweverLongMessagesTake) {
             }
 }
 
-TEST_P(MarketRun, OneWorkerAtHalfSpeedCostsLittleWithBalancing) {
+TEST(MarketRun, OneWorkerAtHalfSpeedCostsLittleWithBalancing) {
     const sim::WorldScene scene = at_rest(20, 10);
     for (const int slow : {0, 3}) {
         double elapsed[2];
         for (const bool trade : {false, true}) {
-            sim::DistributedSettings settings = steps_of(GetParam(), 800);
+            sim::DistributedSettings settings = for_steps(800);
             settings.market.trade = trade;
             sim::SimulatedProcessors how = processors(5);
             how.latency_s = 2e-6;
@@ -301,8 +291,3 @@ TEST_P(MarketRun, OneWorkerAtHalfSpeedCostsLittleWithBalancing) {
         EXPECT_GT(elapsed[0] / elapsed[1], 1.5) << slow;
     }
 }
-
-INSTANTIATE_TEST_SUITE_P(Paces, MarketRun, testing::Values(sim::Pace::lockstep, sim::Pace::bounded),
-                         [](const auto& pace) {
-                             return pace.param == sim::Pace::lockstep ? "Lockstep" : "Bounded";
-                         });

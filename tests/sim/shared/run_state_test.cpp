@@ -7,7 +7,6 @@
 #include "shared_scenes.h"
 #include "sim/distributed_world.h"
 #include "sim/errors.h"
-#include "workers/world_processes.h"
 
 namespace {
 
@@ -25,7 +24,7 @@ struct Seen : sim::DistributedObserver {
     std::map<std::uint64_t, Bytes> saved;
 };
 
-/// All that a result says, but for times; of workers also without what their trades change.
+/// All that a result says, but for times.
 std::string text_of(const sim::DistributedResult& r) {
     std::ostringstream out;
     out.precision(17);
@@ -44,13 +43,13 @@ std::string text_of(const sim::DistributedResult& r) {
 /// Goes on from each saved state: every later step has the bits of the undisturbed run.
 void expect_same_after_resume(const sim::WorldScene& scene, std::uint64_t steps, std::uint64_t every) {
     Seen whole(every);
-    const sim::DistributedResult result = run_alone(scene, sim_test::lockstep(steps), whole);
+    const sim::DistributedResult result = run_alone(scene, world_test::for_steps(steps), whole);
     ASSERT_FALSE(whole.saved.empty());
     for (const auto& [step, bytes] : whole.saved) {
         const sim::RunState from = sim::decode_run_state(bytes, scene);
         EXPECT_EQ(sim::encode(from), bytes);
         Seen after;
-        const sim::DistributedResult again = run_alone(scene, sim_test::lockstep(steps), after, &from);
+        const sim::DistributedResult again = run_alone(scene, world_test::for_steps(steps), after, &from);
         for (const auto& [later, hash] : after.hashes)
             ASSERT_EQ(hash, whole.hashes.at(later)) << "from step " << step << " at " << later;
         EXPECT_EQ(after.hashes.size(), 2 + steps - step);  // the start, and from `step` on
@@ -129,48 +128,16 @@ TEST(RunState, WhatSleepsGoesOnAsleepAndWakesWithItsGroup) {
     scene.later = {world_test::ball({0, 3, 0}, sim::Fidelity::modal, 0.3)};
     scene.events = {{120, {}, 0, 1, {}}};
     Seen seen(110);
-    (void)run_alone(scene, sim_test::lockstep(130), seen);
+    (void)run_alone(scene, world_test::for_steps(130), seen);
     const sim::RunState state = sim::decode_run_state(seen.saved.at(110), scene);
     EXPECT_TRUE(state.world.bodies[0].asleep);  // or the test is none
     expect_same_after_resume(scene, 200, 25);
 }
 
-TEST(RunState, WorkersGoOnInLockstepAlsoInAnotherNumberAndAsOneProcess) {
-    const sim::WorldScene scene = sim_test::heap(18);
-    Seen alone(20);
-    (void)run_alone(scene, sim_test::lockstep(60), alone);
-    sim::DistributedSettings settings = sim_test::lockstep(60);
-    settings.market.trade = false;
-    Seen two(20);
-    const sim::DistributedResult whole = run_distributed(scene, settings, sim_test::processes(2), two);
-    EXPECT_EQ(two.hashes, alone.hashes);
-    for (const int workers : {2, 3, 1}) {
-        const sim::RunState from = sim::decode_run_state(two.saved.at(20), scene);
-        Seen after(20);
-        sim::DistributedResult again =
-            run_distributed(scene, settings, sim_test::processes(workers), after, &from);
-        for (const auto& [step, hash] : after.hashes) ASSERT_EQ(hash, alone.hashes.at(step)) << step;
-        EXPECT_EQ(again.steps, 60u);
-        EXPECT_EQ(after.saved.size(), 2u);
-        if (workers != 2) continue;
-        // By whom a plane's impulse is counted differs, so it is summed in another order: the first step is done by each alone.
-        EXPECT_LT((again.outside_impulse - whole.outside_impulse).norm(),
-                  1e-12 * whole.outside_impulse.norm());
-        again.outside_impulse = whole.outside_impulse;
-        EXPECT_EQ(text_of(again), text_of(whole));
-        EXPECT_EQ(again.records, whole.records);
-        EXPECT_EQ(again.cross_contacts, whole.cross_contacts);
-    }
-    const sim::RunState from = sim::decode_run_state(two.saved.at(40), scene);
-    Seen after;
-    (void)run_alone(scene, settings, after, &from);
-    EXPECT_EQ(after.hashes.at(60), alone.hashes.at(60));
-}
-
 TEST(RunState, NoBytesAreReadThatNoRunOfTheSceneCanBeIn) {
     const sim::WorldScene scene = random_scene(1);
     Seen seen(30);
-    (void)run_alone(scene, sim_test::lockstep(30), seen);
+    (void)run_alone(scene, world_test::for_steps(30), seen);
     const Bytes good = seen.saved.at(30);
     std::mt19937 random(5);
     int refused = 0;
@@ -181,7 +148,7 @@ TEST(RunState, NoBytesAreReadThatNoRunOfTheSceneCanBeIn) {
             const sim::RunState from = sim::decode_run_state(bad, scene);
             if (i % 16 != 0) continue;
             sim::DistributedObserver silent;  // what is accepted runs on, wherever it leads
-            sim::DistributedSettings settings = sim_test::lockstep(from.result.steps + 2);
+            sim::DistributedSettings settings = world_test::for_steps(from.result.steps + 2);
             if (from.result.steps < 1000) (void)run_alone(scene, settings, silent, &from);
         } catch (const sim::InputError&) {
             ++refused;

@@ -16,8 +16,8 @@ using Failure = sim::SimulatedProcessors::Failure;
 TEST(SimulatedProcessors, ThatRepeatTheirWorkAloneLeaveTheBitsAlsoThroughDrainsJoinsAndKills) {
     const sim::WorldScene scene = busy_scene(12);
     for (const int bound : {0, 3}) {
-        sim::DistributedSettings settings = lockstep(120);
-        if (bound > 0) settings.pace = sim::Pace::bounded, settings.bound = bound;
+        sim::DistributedSettings settings = for_steps(120);
+        settings.bound = bound;
         sim::SimulatedProcessors how = processors(3);
         how.silence_s = 0.01;
         how.failures = {{0.002, 1, Failure::Kind::drain},
@@ -46,8 +46,8 @@ TEST(SimulatedProcessors, OutOfStepTheLastStatesAreExact) {
         scene.world.bodies.push_back(body);
     }
     const std::vector<std::uint64_t> alone = hashes_alone(scene, 40);
-    sim::DistributedSettings settings = lockstep(40);
-    settings.pace = sim::Pace::bounded, settings.bound = 4;
+    sim::DistributedSettings settings = for_steps(40);
+    settings.bound = 4;
     Record record;
     (void)sim::simulate_processors(scene, settings, processors(3), record);
     EXPECT_EQ(record.hashes.back(), alone.back());
@@ -57,7 +57,7 @@ TEST(SimulatedProcessors, OutOfStepTheLastStatesAreExact) {
 TEST(SimulatedProcessors, TellTheirOwnTimeAsProcessorTime) {
     Record record;
     const sim::DistributedResult result =
-        sim::simulate_processors(busy_scene(8), lockstep(10), processors(2), record);
+        sim::simulate_processors(busy_scene(8), for_steps(10), processors(2), record);
     double sum = 0;
     for (const sim::WorkerStep& step : record.steps) {
         EXPECT_EQ(step.processor_s, step.seconds);

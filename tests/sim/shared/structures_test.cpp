@@ -21,7 +21,7 @@ std::vector<int> all_of(const sim::World& world) {
 }
 
 Bodies structures_of(const sim::WorldDefinition& definition, double size = 1) {
-    const sim::World world(definition);
+    const sim::SharedWorld world(definition);
     return sim::structures(world, all_of(world), size);
 }
 
@@ -53,8 +53,8 @@ public:
 };
 
 sim::DistributedSettings bounded(std::uint64_t steps, int bound) {
-    sim::DistributedSettings settings = lockstep(steps);
-    settings.pace = sim::Pace::bounded, settings.bound = bound;
+    sim::DistributedSettings settings = for_steps(steps);
+    settings.bound = bound;
     return settings;
 }
 
@@ -111,9 +111,8 @@ TEST(Structures, AreSlowSmallAndHardlyTouchedByOthers) {
     // Two pillars of a beam that another owner has: a body of others touches four own ones at each.
     for (const int high : {4, 3}) {
         const sim::WorldDefinition shared = gate(1, 2, high);
-        sim::World world(shared);
+        sim::SharedWorld world(shared);
         const int beam = world.bodies() - 1;
-        world.share(sim::Sharing::pairs);
         world.set_own(beam, false);
         std::vector<int> own = all_of(world), near;
         own.pop_back();
@@ -133,7 +132,7 @@ TEST(Structures, OfFlatBodiesAreAlsoThoseThatFallIntoPlace) {
     for (int i = 0; i < 4; ++i) d.bodies.push_back(box({0, 1 + 1.2 * i, 0}, {0.5, 0.5, 0.5}));
     d.bodies.push_back(box({1.15, 1, 0}, {0.5, 0.5, 0.5}));  // beside them, and falls so
     const auto found = [&](double within_s) {
-        const sim::World world(d);
+        const sim::SharedWorld world(d);
         return sim::flat_structures(world, all_of(world), 1, within_s);
     };
     EXPECT_TRUE(found(0.1).empty());  // by 0.05 m
@@ -143,7 +142,7 @@ TEST(Structures, OfFlatBodiesAreAlsoThoseThatFallIntoPlace) {
     for (sim::WorldBody& body : d.bodies) body.velocity.y() -= 10;  // however fast
     EXPECT_EQ(found(0.2), (Bodies{{0, 1, 2, 3, 4}}));
     // Others' bodies count, but are not given.
-    const sim::World world(d);
+    const sim::SharedWorld world(d);
     const std::vector<int> own = {0, 1};
     const std::vector<sim::OthersBody> others = {{2, false, world.state(2)}, {3, false, world.state(3)}};
     EXPECT_EQ(sim::flat_structures(world, own, 1, 0.2, others), (Bodies{{0, 1}}));
@@ -165,7 +164,7 @@ TEST(Structures, OfFlatBodiesAreNotThoseThatLieApartOrPassBy) {
         d.bodies.push_back(box({1.05 * (i % 3), 0.5, 1.05 * (i / 3)}, {0.5, 0.5, 0.5}));
     d.bodies.push_back(box({6, 0.5, -2}, {0.5, 0.5, 0.5}));
     const auto found = [&] {
-        const sim::World world(d);
+        const sim::SharedWorld world(d);
         return sim::flat_structures(world, all_of(world), 1, 0.2);
     };
     EXPECT_TRUE(found().empty());
@@ -205,7 +204,7 @@ TEST(Structures, BodiesThatDifferMuchInMassOrLengthAreUnlikeUnlessAStructureHasT
     const auto alike = [](const std::vector<sim::WorldBody>& bodies, const Bodies& structures = {}) {
         sim::WorldDefinition d = on_floor();
         d.bodies = bodies;
-        const sim::World world(d);
+        const sim::SharedWorld world(d);
         Bodies lots;
         for (const int body : all_of(world)) lots.push_back({body});
         return sim::are_alike(world, lots, structures);
@@ -257,8 +256,8 @@ TEST(Structures, AWorkerThatOwnsAllStepsThemAsOneProcess) {
     for (int i = 0; i < 14; ++i)
         d.bodies.push_back(
             box({0.204 * (i % 4) + 0.05 * (i / 4 % 2), 0.15 + 0.35 * (i / 4), 0}, {0.1, 0.05, 0.05}, 1000));
-    sim::World alone(d), shared(d);
-    shared.share(sim::Sharing::pairs);
+    sim::World alone(d);
+    sim::SharedWorld shared(d);
     for (int step = 0; step < 120; ++step) {
         alone.step(), shared.step();
         ASSERT_EQ(alone.state_hash(), shared.state_hash()) << step;

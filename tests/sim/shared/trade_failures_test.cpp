@@ -24,11 +24,8 @@ constexpr std::uint64_t kSteps = 30;
 constexpr int kWorkers = 3;
 
 // One worker starts with everything; trades from the third step on.
-sim::DistributedSettings trading(sim::Pace pace) {
-    sim::DistributedSettings settings;
-    settings.pace = pace;
-    settings.bound = pace == sim::Pace::bounded ? 4 : 0;
-    settings.steps = kSteps;
+sim::DistributedSettings trading() {
+    sim::DistributedSettings settings = for_steps(kSteps);
     settings.all_to_first = true;
     settings.market.from_step = 3;
     return settings;
@@ -67,13 +64,11 @@ std::vector<std::vector<Failure>> failures(double elapsed, double silence) {
     return all;
 }
 
-class TradeFailures : public testing::TestWithParam<sim::Pace> {};
-
 }  // namespace
 
-TEST_P(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFinished) {
+TEST(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFinished) {
     const sim::WorldScene scene = busy_scene();
-    const sim::DistributedSettings settings = trading(GetParam());
+    const sim::DistributedSettings settings = trading();
     Record whole;
     const auto unharmed = sim::simulate_processors(scene, settings, processors(), whole);
     ASSERT_GE(unharmed.trades, 2u);
@@ -91,9 +86,6 @@ TEST_P(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFin
         EXPECT_EQ(result.steps, kSteps);
         EXPECT_TRUE(record.in_order);
         ASSERT_EQ(record.hashes.size(), kSteps + 1);
-        if (GetParam() == sim::Pace::lockstep) {
-            EXPECT_EQ(record.hashes, whole.hashes);
-        }
         int own = 0;
         for (const auto& [number, bodies] : record.own) {
             EXPECT_GE(bodies, 0) << "nobody gives what it has not";
@@ -105,11 +97,10 @@ TEST_P(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFin
     EXPECT_GT(reowned, 100u) << "failures met workers that owned bodies";
 }
 
-TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAndTheRunFinished) {
+TEST(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAndTheRunFinished) {
     const sim::WorldScene scene = busy_scene();
-    sim::DistributedSettings settings = trading(GetParam());
+    sim::DistributedSettings settings = trading();
     settings.steps = 60;
-    const std::vector<std::uint64_t> alone = hashes_alone(scene, settings.steps);
     const unsigned runs = std::getenv("MUSICWORLD_LONG") ? 400 : 20;
     std::uint64_t trades = 0, reowned = 0;
     for (unsigned seed = 0; seed < runs; ++seed) {
@@ -120,7 +111,7 @@ TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerA
         how.count = 1 + static_cast<int>(random() % 5);
         how.latency_s = 1e-5 * std::pow(30, uniform());
         settings.all_to_first = seed % 2 == 0;
-        settings.bound = GetParam() == sim::Pace::bounded ? static_cast<int>(random() % 6) : 0;
+        settings.bound = static_cast<int>(random() % 6);
         // Slow for ten steps at a time, in an order that the seed decides.
         how.factor = [seed](int worker, std::uint64_t step) {
             const std::uint64_t mixed =
@@ -140,9 +131,6 @@ TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerA
         ASSERT_NO_THROW(result = sim::simulate_processors(scene, settings, how, record)) << record.notes;
         EXPECT_EQ(result.steps, settings.steps);
         EXPECT_TRUE(record.in_order);
-        if (GetParam() == sim::Pace::lockstep) {
-            EXPECT_EQ(record.hashes, alone);
-        }
         const int own = std::accumulate(record.own.begin(), record.own.end(), 0,
                                         [](int sum, const auto& worker) { return sum + worker.second; });
         EXPECT_EQ(own, moving_bodies(scene));
@@ -151,11 +139,6 @@ TEST_P(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerA
     EXPECT_GT(trades, runs) << "bodies changed hands all the time";
     EXPECT_GT(reowned, runs);
 }
-
-INSTANTIATE_TEST_SUITE_P(Paces, TradeFailures, testing::Values(sim::Pace::lockstep, sim::Pace::bounded),
-                         [](const auto& pace) {
-                             return pace.param == sim::Pace::lockstep ? "Lockstep" : "Bounded";
-                         });
 
 // Whoever then comes to the last step by taking the bodies over publishes it as others do, before its exact states.
 TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
@@ -167,8 +150,8 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
                 scene.world.bodies.push_back(ball({3. * i, 0, 0}));
                 scene.world.bodies.back().name += std::to_string(i);
             }
-            sim::DistributedSettings settings = lockstep(20);
-            settings.pace = sim::Pace::bounded, settings.bound = 4, settings.market.trade = false;
+            sim::DistributedSettings settings = for_steps(20);
+            settings.market.trade = false;
             Record record;
             sim::Coordinator meeting(scene, settings, record);
             std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
@@ -184,12 +167,8 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
                     }
             };
             const auto send = [&](std::uint32_t number) {
-                for (sim::SharedWorldWorker::Outgoing& out : workers.at(number)->outgoing()) {
-                    meeting.take(number, out.to.empty()
-                                             ? out.bytes
-                                             : workers.at(number)->relayed(std::move(out.to), out.bytes));
-                    meeting.advance();
-                }
+                for (const std::vector<std::uint8_t>& bytes : workers.at(number)->outgoing())
+                    meeting.take(number, bytes), meeting.advance();
             };
             deliver();
             meeting.start();
@@ -238,15 +217,12 @@ TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
     sim::WorldScene scene;
     scene.world = sim_bench::falling_balls(60);
     const double weight = weight_of(sim::World(scene.world));
-    sim::DistributedSettings settings = lockstep(120);
-    settings.pace = sim::Pace::bounded;
+    sim::DistributedSettings settings = for_steps(120);
     for (const int bound : {0, 1, 4, 16})
         for (const int leave : {1, 2, 3}) {
             settings.bound = bound;
             sim::SimulatedProcessors how = processors();
             how.count = 4;
-            // Registrations come before or after what workers tell each other.
-            how.by_application_s = bound == 1 ? 5e-4 : 0, how.directly_s = bound == 4 ? 5e-4 : 0;
             Record unharmed;
             const double whole = sim::simulate_processors(scene, settings, how, unharmed).elapsed_s;
             for (int k = 0; k < leave; ++k)  // at once, or one after the other
@@ -270,8 +246,8 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
         scene.world = world_test::on_floor();
         for (int i = 0; i < 27; ++i)
             scene.world.bodies.push_back(world_test::ball({3.0 * (i % 9), 4, 3.0 * (i / 9)}));
-        sim::DistributedSettings settings = lockstep(120);
-        settings.pace = sim::Pace::bounded, settings.bound = 16;
+        sim::DistributedSettings settings = for_steps(120);
+        settings.bound = 16;
         MomentumRecord record;
         sim::Coordinator meeting(scene, settings, record);
         std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
@@ -292,10 +268,8 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
                             workers.at(to)->take(message.header, std::move(message.message));
                     }
                 for (auto& [number, worker] : workers)
-                    for (sim::SharedWorldWorker::Outgoing& out : worker->outgoing()) {
+                    for (std::vector<std::uint8_t>& bytes : worker->outgoing()) {
                         more = true;
-                        std::vector<std::uint8_t> bytes =
-                            out.to.empty() ? out.bytes : worker->relayed(out.to, out.bytes);
                         if (number == 0)
                             late.emplace_back(round + late_by, std::move(bytes));
                         else
@@ -353,8 +327,7 @@ TEST(Leaving, AndJoiningOutOfStepKeepTheMomentumOfBallsThatRebound) {
                 }
                 return sim::World(scene.world).momentum();
             }();
-            sim::DistributedSettings settings = lockstep(200);
-            settings.pace = sim::Pace::bounded;
+            sim::DistributedSettings settings = for_steps(200);
             settings.bound = std::array{0, 1, 2, 4, 8, 16, 32, 64}[random() % 8];
             settings.market.from_step = 3;
             settings.all_to_first = random() % 3 == 0;

@@ -10,7 +10,6 @@
 #include "messages/worker_messages.h"
 #include "shared/shared_world_worker.h"
 #include "workers/heartbeat.h"
-#include "workers/peer_links.h"
 
 namespace sim_test {
 
@@ -19,17 +18,14 @@ namespace sim_test {
 class HostileMember {
 public:
     enum class Habit {
-        republishes,  ///< its last states, every 100 ms
-        offers,       ///< bodies to worker 0, as fast as they go out
-        lies,         ///< of where its bodies are, by a tenth of a millimetre
-        floods_links,  ///< of the others with what is no message, and withholds its parts of each step, from the first on
+        republishes,   ///< its last states, every 100 ms
+        offers,        ///< bodies to worker 0, as fast as they go out
         says_nothing,  ///< but heartbeats: it answers no offer
         is_silent      ///< nothing, and no heartbeats
     };
     HostileMember(const std::string& endpoint, Habit habit, int honest_steps,
                   const std::optional<sim::WorkerKeys>& keys = {})
-        : endpoint_(endpoint),
-          habit_(habit),
+        : habit_(habit),
           honest_steps_(honest_steps),
           thread_([this, endpoint, keys](const std::stop_token& stop) { live(endpoint, keys, stop); }) {}
     [[nodiscard]] bool given_up() const { return given_up_; }  ///< it was told so
@@ -43,19 +39,18 @@ private:
         zmq::socket_t beats = sim::connect_worker(context_, endpoint, keys, 0);
         socket.set(zmq::sockopt::rcvtimeo, 2);
         const sim::Secret secret = sim::make_secret();
-        send(socket, sim::encode({}, sim::JoinRequest{sim::step_fingerprint(), secret, "hostile"}));
+        send(socket, sim::encode({}, sim::JoinRequest{secret, "hostile"}));
         Clock::time_point beaten{};
         while (!stop.stop_requested()) {
             take(socket);
             if (!worker_) continue;
-            const bool honest = steps_ < honest_steps_ || habit_ == Habit::lies || links_;
+            const bool honest = steps_ < honest_steps_;
             if ((honest || habit_ != Habit::is_silent) &&
                 Clock::now() - beaten > std::chrono::milliseconds(50)) {
                 send(beats, sim::encode({number_, 0, 0}, sim::Beat{secret}));
                 beaten = Clock::now();
             }
             honest ? serve(socket) : be_hostile(socket);
-            if (links_) flood_links();
         }
     }
     static void send(zmq::socket_t& socket, const std::vector<std::uint8_t>& bytes) {
@@ -70,23 +65,9 @@ private:
         if (const auto* scene = std::get_if<sim::SceneMessage>(&m.message)) {
             number_ = scene->worker;
             worker_.emplace(*scene);
-            if (habit_ != Habit::floods_links) return;
-            links_.emplace(context_, sim::PeerLinks::Settings{
-                                         number_, scene->settings.pace, endpoint_, {}, 1 << 20, 1000, 1000});
-            if (links_->reach()) send(socket, sim::encode({number_, 0, 0}, *links_->reach()));
-        } else if (const auto* peers = std::get_if<sim::PeersMessage>(&m.message)) {
-            if (links_) links_->add(*peers);
-        } else if (const auto* members = std::get_if<sim::Members>(&m.message); members && links_) {
-            others_ = members->workers;
-            worker_->take(m.header, std::move(m.message));
         } else if (worker_) {
             worker_->take(m.header, std::move(m.message));
         }
-    }
-    [[nodiscard]] std::vector<std::uint8_t> moved(sim::DecodedMessage&& m) const {
-        if (auto* state = std::get_if<sim::StateMessage>(&m.message))
-            for (sim::WorldRecord& record : state->bodies) record.state.position.x() += 1e-4;
-        return sim::encode(m.header, m.message);
     }
     void serve(zmq::socket_t& socket) {
         if (worker_->ready()) {
@@ -94,25 +75,11 @@ private:
             worker_->worked({.seconds = 1e-3});
             ++steps_;
         }
-        for (const sim::SharedWorldWorker::Outgoing& message : worker_->outgoing()) {
-            if (links_ && !message.to.empty()) continue;
-            const std::vector<std::uint8_t> bytes =
-                message.to.empty() ? message.bytes : worker_->relayed(message.to, message.bytes);
-            const sim::DecodedMessage m = sim::decode_message(bytes);
-            if (std::holds_alternative<sim::StateMessage>(m.message) ||
-                std::holds_alternative<sim::UpdateMessage>(m.message))
-                states_ = bytes;
-            send(socket,
-                 habit_ == Habit::lies && steps_ > honest_steps_ ? moved(sim::decode_message(bytes)) : bytes);
+        for (std::vector<std::uint8_t>& bytes : worker_->outgoing()) {
+            send(socket, bytes);
+            if (std::holds_alternative<sim::UpdateMessage>(sim::decode_message(bytes).message))
+                states_ = std::move(bytes);
         }
-    }
-    void flood_links() {
-        const auto now = std::chrono::steady_clock::now();
-        links_->look(now);
-        while (links_->receive(now)) {
-        }
-        links_->begin_step();
-        for (int i = 0; i < 1000; ++i) (void)links_->send(others_, {1, 2, 3});
     }
     void be_hostile(zmq::socket_t& socket) {
         if (habit_ == Habit::republishes) {
@@ -124,7 +91,6 @@ private:
         }
     }
 
-    const std::string endpoint_;
     zmq::context_t context_;
     const Habit habit_;
     const int honest_steps_;
@@ -132,8 +98,6 @@ private:
     std::uint32_t number_ = 0;
     std::optional<sim::SharedWorldWorker> worker_;
     std::vector<std::uint8_t> states_;
-    std::vector<std::uint32_t> others_;
-    std::optional<sim::PeerLinks> links_;
     std::atomic<bool> given_up_ = false;
     std::jthread thread_;  // last: starts when the rest is there
 };

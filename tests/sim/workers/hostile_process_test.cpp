@@ -9,11 +9,9 @@ namespace {
 
 using namespace sim_test;
 
-// Out of step: the tests' build need not compute the bits of the program's, and lockstep would refuse it.
 TEST(SharedWorldProcess, AProcessThatJoinsAndRepublishesOldStatesIsGivenUpAndTheRunEndsWhole) {
     const std::string endpoint = free_endpoint();
-    SimulateCommand run(
-        "benchmark25 --steps 200 --workers 1 --mode async --balance off --expect 2 --listen " + endpoint);
+    SimulateCommand run("benchmark25 --steps 200 --workers 1 --balance off --expect 2 --listen " + endpoint);
     run.wait_until_listening();
     const HostileMember hostile(endpoint, HostileMember::Habit::republishes, 20);
     const SimulateCommand::Ended ended = run.wait();

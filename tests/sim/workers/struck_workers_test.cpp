@@ -123,7 +123,7 @@ TEST(StruckWorkers, GarbageAndForgedMessagesToItsSocketDoNoHarm) {
         for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(rng());
         stranger.send(zmq::buffer(noise), i % 3 ? zmq::send_flags::none : zmq::send_flags::sndmore);
         for (const sim::WorkerMessage& forged :
-             {sim::WorkerMessage(sim::JoinRequest{0, {}, "forged"}), sim::WorkerMessage(sim::EndOfRun{}),
+             {sim::WorkerMessage(sim::JoinRequest{{}, "forged"}), sim::WorkerMessage(sim::EndOfRun{}),
               sim::WorkerMessage(sim::Beat{}),
               sim::WorkerMessage(sim::StruckAnswer{1, static_cast<std::uint64_t>(i), {}})})
             stranger.send(zmq::buffer(sim::encode({}, forged)), zmq::send_flags::none);

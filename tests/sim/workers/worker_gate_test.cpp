@@ -77,7 +77,7 @@ std::shared_ptr<const std::vector<std::uint8_t>> shared(const sim::WorkerMessage
 /// As a worker does, the peer says nothing before it has heard that it is a member: the gate admits it on a thread
 /// of its own.
 void join(sim::WorkerGate& gate, Peer& peer, std::uint32_t worker, const sim::Secret& secret = {1}) {
-    peer.send(sim::JoinRequest{7, secret, "host"});
+    peer.send(sim::JoinRequest{secret, "host"});
     const auto event = wait_for(gate, Kind::asks_to_join);
     ASSERT_TRUE(event);
     EXPECT_EQ(event->request.secret, secret);
@@ -113,10 +113,10 @@ TEST(WorkerGate, AStrangersMessagesAreRefusedAndGarbageIsCountedAndAnsweredByNot
         for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(rng());
         stranger.send_bytes(noise, i % 3 == 0);
     }
-    std::vector<std::uint8_t> forged = sim::encode({}, sim::JoinRequest{1, {2}, "x"});
-    forged[30] ^= 1;
+    std::vector<std::uint8_t> forged = sim::encode({}, sim::JoinRequest{{2}, "x"});
+    forged[8] ^= 1;  // its length
     stranger.send_bytes(forged);
-    stranger.send(sim::JoinRequest{9, {9}, "the last"});
+    stranger.send(sim::JoinRequest{{9}, "the last"});
     const auto event = wait_for(gate, Kind::asks_to_join);
     ASSERT_TRUE(event);
     EXPECT_EQ(event->request.host, "the last");  // nothing before it came through
@@ -171,9 +171,9 @@ TEST(WorkerGate, OfAFloodOfJoinsSomeComeThroughAndEachThatIsExpected) {
     const sim::Secret own = sim::make_secret();
     gate.expect(own);
     Peer flood(gate.endpoint()), child(gate.private_endpoint());
-    for (int i = 0; i < 5000; ++i) flood.send(sim::JoinRequest{7, sim::make_secret(), "flood"});
+    for (int i = 0; i < 5000; ++i) flood.send(sim::JoinRequest{sim::make_secret(), "flood"});
     EXPECT_TRUE(gets<sim::Refusal>(flood));
-    child.send(sim::JoinRequest{7, own, "child"});
+    child.send(sim::JoinRequest{own, "child"});
     unsigned strangers = 0;
     bool came = false;
     const auto answered = [&] { return strangers + gate.refused_messages(); };
@@ -191,7 +191,7 @@ TEST(WorkerGate, WhatAStrangerSendsIsSmallAndWhatAMemberSaysOfItselfIsPrintable)
     sim::WorkerGate gate({"", {}, 60});
     Peer stranger(gate.private_endpoint());
     stranger.send(sim::WorkerFailure{std::string(4096, 'x')});
-    stranger.send(sim::JoinRequest{7, {1}, "\xff\xfe\x1b[2J\n\"host"});
+    stranger.send(sim::JoinRequest{{1}, "\xff\xfe\x1b[2J\n\"host"});
     const auto event = wait_for(gate, Kind::asks_to_join);
     ASSERT_TRUE(event);
     EXPECT_EQ(event->request.host, "???[2J?\"host");
@@ -208,7 +208,7 @@ TEST(WorkerGate, AMemberThatReadsNothingHasItsLinkBrokenAndTheOthersGetAll) {
     slow.set(zmq::sockopt::linger, 0);
     slow.set(zmq::sockopt::rcvhwm, 1);
     slow.connect(gate.private_endpoint());
-    const std::vector<std::uint8_t> request = sim::encode({}, sim::JoinRequest{7, {1}, "slow"});
+    const std::vector<std::uint8_t> request = sim::encode({}, sim::JoinRequest{{1}, "slow"});
     (void)slow.send(zmq::buffer(request), zmq::send_flags::none);
     const auto event = wait_for(gate, Kind::asks_to_join);
     ASSERT_TRUE(event);
@@ -341,7 +341,7 @@ TEST(WorkerGate, IdleConnectionsLeaveDescriptorsForWhatIsWrittenAndMembersStay) 
     EXPECT_TRUE(wait_for(gate, Kind::message));
     // Who does not shake hands goes after 5 s, and who comes then gets in, after trying again.
     Peer late(gate.endpoint());
-    late.send(sim::JoinRequest{7, {2}, "late"});
+    late.send(sim::JoinRequest{{2}, "late"});
     EXPECT_TRUE(wait_for(gate, Kind::asks_to_join));
 }
 
@@ -368,11 +368,11 @@ TEST(WorkerGate, WithKeysOnlyAListedKeyComesThrough) {
     unlisted.application = sim::read_application_keys(keys.path()).pair.shown;
     Peer wrong(gate.endpoint(), unlisted);
     Peer right(gate.endpoint(), sim::read_worker_keys(keys.path() / "worker.key"));
-    without.send(sim::JoinRequest{1, {1}, "without"});
-    wrong.send(sim::JoinRequest{1, {1}, "wrong"});
+    without.send(sim::JoinRequest{{1}, "without"});
+    wrong.send(sim::JoinRequest{{1}, "wrong"});
     for (int i = 0; i < 1000 && gate.refused_keys() == 0; ++i) std::this_thread::sleep_for(10ms);
     EXPECT_GT(gate.refused_keys(), 0u);
-    right.send(sim::JoinRequest{1, {1}, "right"});
+    right.send(sim::JoinRequest{{1}, "right"});
     const auto event = wait_for(gate, Kind::asks_to_join);
     ASSERT_TRUE(event);
     EXPECT_EQ(event->request.host, "right");

@@ -1,4 +1,6 @@
 #pragma once
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -9,7 +11,7 @@
 #include "workers/worker_process.h"
 #include "world_bodies.h"
 
-/// Shared worlds on real processes: a scene, its bits, and the processes.
+/// Shared worlds on real processes: a scene, what is seen of it, and the processes.
 namespace sim_test {
 
 /// A heap of soft balls and rigid boxes that falls, touches and is joined: contacts between all workers.
@@ -28,28 +30,18 @@ inline sim::WorldScene heap(int bodies) {
     return scene;
 }
 
-/// Of the scene after some steps in one process.
-inline std::uint64_t hash_alone(const sim::WorldScene& scene, std::uint64_t steps) {
-    sim::World world(scene.world);
-    for (std::uint64_t i = 0; i < steps; ++i) {
-        for (const sim::WorldEvent& event : scene.events)
-            if (event.step == i)
-                for (const int c : event.removed) world.remove_constraint(c);
-        world.step();
-    }
-    return world.state_hash();
-}
-
-/// Keeps the hash of the last step, and does something at a step, once.
+/// Watches the momentum, and does something at a step, once.
 class Watcher : public sim::DistributedObserver {
 public:
-    std::uint64_t last_step = 0, hash = 0;
+    std::uint64_t last_step = 0;
+    Eigen::Vector3d first_momentum = Eigen::Vector3d::Zero(), momentum = first_momentum;
     std::vector<std::string> notes;
     std::vector<std::uint64_t> act_at;
     std::function<void()> act;
 
     void at(std::uint64_t step, const sim::World& world) override {
-        last_step = step, hash = world.state_hash();
+        last_step = step, momentum = world.momentum();
+        if (step == 0) first_momentum = momentum;
         if (std::find(act_at.begin(), act_at.end(), step) != act_at.end()) act();
     }
     void note(const std::string& what) override { notes.push_back(what); }
@@ -58,6 +50,13 @@ public:
                            [&](const std::string& n) { return n.find(part) != std::string::npos; });
     }
 };
+
+/// The bodies' momentum at the end is what came from outside; to rounding, in units of 1 N s.
+inline void expect_momentum_kept(const Watcher& watcher, const sim::DistributedResult& result) {
+    EXPECT_LT((watcher.momentum - watcher.first_momentum - result.outside_impulse).norm(),
+              1e-9 * (1 + result.outside_impulse.norm()))
+        << testing::PrintToString(watcher.notes);
+}
 
 /// So many workers, started here.
 inline sim::DistributedLaunch processes(int count) {
@@ -73,7 +72,7 @@ inline sim::WorkerProcess start_elsewhere(const std::string& endpoint, const std
     return {launch, endpoint};
 }
 
-inline sim::DistributedSettings lockstep(std::uint64_t steps) {
+inline sim::DistributedSettings for_steps(std::uint64_t steps) {
     sim::DistributedSettings settings;
     settings.steps = steps;
     return settings;
