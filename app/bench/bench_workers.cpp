@@ -210,8 +210,7 @@ public:
             "{} workers, this machine's cores, which the application shares. Critical path: by "
             "processor time of the workers' stepping threads, with their messages, if each step waited for "
             "all others' step before it (async: for the one before that). async: with the bound; barrier: "
-            "with "
-            "a bound of 0.",
+            "with a bound of 0.",
             options_.steps, options_.rounds, cores()));
     }
 

@@ -20,8 +20,8 @@ void Coordinator::expel(std::uint32_t worker, const std::string& why) {
     lose(worker, "its message was refused: " + why);
 }
 
-// Between two steps of all bodies a member does at most `bound` + 1 steps, and makes or answers an offer for each
-// step of each member. What is relayed is bounded by this.
+// Between two steps of all bodies a member does at most `bound` + 1 steps, tells each other member of each, and makes
+// or answers an offer for each step of each member. What is relayed is bounded by this.
 bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
     constexpr std::size_t kMessages = 256, kRepeated = 8;
     const auto steps = static_cast<std::size_t>(settings_.bound) + 2;

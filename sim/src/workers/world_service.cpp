@@ -1,5 +1,6 @@
 #include "workers/world_service.h"
 
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <optional>
@@ -10,7 +11,6 @@
 #include "sim/errors.h"
 #include "workers/elapsed.h"
 #include "workers/leave_signals.h"
-#include "workers/through_signals.h"
 #include "world/processor_time.h"
 
 namespace sim {
@@ -19,6 +19,18 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr int kPollMs = 50;
 constexpr double kLongestForAnswer = 0.5;  // that the next step waits for the answer to an offer [s]
+
+/// A ZeroMQ call, again if a signal interrupts it.
+template <typename Call>
+auto through_signals(const Call& call) {
+    for (;;) {
+        try {
+            return call();
+        } catch (const zmq::error_t& e) {
+            if (e.num() != EINTR) throw;
+        }
+    }
+}
 
 /// Sleeps through a signal too.
 void sleep_for(double seconds) {
