@@ -3,17 +3,17 @@
 #include <array>
 #include <cmath>
 
-#include "arbitrated.h"
-#include "extrapolators.h"
-#include "interacting_models.h"
-#include "kalman_predictor.h"
-#include "learned_path.h"
-#include "least_squares.h"
-#include "model_bank.h"
-#include "rebounding.h"
-#include "smoothers.h"
+#include "filter/extrapolators.h"
+#include "filter/interacting_models.h"
+#include "filter/kalman_predictor.h"
+#include "filter/least_squares.h"
+#include "filter/model_bank.h"
+#include "filter/smoothers.h"
+#include "learned/arbitrated.h"
+#include "learned/learned_path.h"
+#include "learned/rebounding.h"
 #include "specification.h"
-#include "text_cursor.h"
+#include "trace/text_cursor.h"
 
 namespace tracking {
 namespace {
