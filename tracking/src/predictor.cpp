@@ -164,7 +164,8 @@ std::unique_ptr<Predictor> make_online(Specification& specification, const Eigen
     return std::make_unique<Learned>(model, shaft, memory(specification));
 }
 
-/// `cv`, whose velocity fades while its turning lasts, and which rebounds where strokes turn.
+/// `cv` whose velocity decays while its angular velocity does not, and which rebounds where strokes turn
+/// back.
 std::unique_ptr<Predictor> make_surface(Specification& specification) {
     const double q = density(specification, "q", 1e7);
     MotionModel fading = constant_velocity(q, specification.number("decay", 8, 1e-3, 1000)),

@@ -10,29 +10,7 @@ Eigen::Quaterniond orientation_of(const PoseSample& sample, const Eigen::Quatern
     return sample.has_orientation ? sample.orientation.normalized() : otherwise;
 }
 
-PosePrediction at_rest(const PoseSample& sample) {
-    PosePrediction pose;
-    pose.position = sample.position;
-    pose.orientation = orientation_of(sample, Eigen::Quaterniond::Identity());
-    return pose;
-}
-
 }  // namespace
-
-PosePrediction ConstantRates::after(double lead_s) const noexcept {
-    PosePrediction pose = now;
-    pose.position += lead_s * now.velocity;
-    pose.orientation = (exponential(lead_s * now.angular_velocity) * now.orientation).normalized();
-    return pose;
-}
-
-void ConstantRates::step_to(const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation,
-                            double dt) noexcept {
-    now.velocity = (position - now.position) / dt;
-    now.angular_velocity = logarithm(orientation * now.orientation.conjugate()) / dt;
-    now.position = position;
-    now.orientation = orientation;
-}
 
 SampleStatus Hold::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);
@@ -48,13 +26,33 @@ PosePrediction Hold::predict(double /*lead_s*/) const noexcept {
     return pose_;
 }
 
+PosePrediction ConstantRates::predict(double lead_s) const noexcept {
+    PosePrediction pose = now_;
+    pose.position += lead_s * now_.velocity;
+    pose.orientation = (exponential(lead_s * now_.angular_velocity) * now_.orientation).normalized();
+    return pose;
+}
+
+void ConstantRates::start(const PoseSample& sample) noexcept {
+    now_ = {};
+    now_.position = sample.position;
+    now_.orientation = orientation_of(sample, Eigen::Quaterniond::Identity());
+}
+
+void ConstantRates::step_to(const Eigen::Vector3d& position, const Eigen::Quaterniond& orientation,
+                            double dt) noexcept {
+    now_.velocity = (position - now_.position) / dt;
+    now_.angular_velocity = logarithm(orientation * now_.orientation.conjugate()) / dt;
+    now_.position = position;
+    now_.orientation = orientation;
+}
+
 SampleStatus Difference::correct(const PoseSample& sample) noexcept {
     const SampleStatus status = clock_.judge(sample);
     if (status == SampleStatus::reinitialised)
-        rates_.now = at_rest(sample);
+        start(sample);
     else if (status == SampleStatus::accepted)
-        rates_.step_to(sample.position, orientation_of(sample, rates_.now.orientation),
-                       sample.t_s - clock_.time_s());
+        step_to(sample.position, orientation_of(sample, now_.orientation), sample.t_s - clock_.time_s());
     else
         return status;
     clock_.advance(sample.t_s);
@@ -68,7 +66,7 @@ SampleStatus MovingAverage::correct(const PoseSample& sample) noexcept {
     clock_.advance(sample.t_s);
     if (status == SampleStatus::reinitialised) {
         window_.fill(sample);
-        rates_.now = at_rest(sample);
+        start(sample);
         return status;
     }
     window_.push(sample);
@@ -81,7 +79,7 @@ SampleStatus MovingAverage::correct(const PoseSample& sample) noexcept {
         turn += logarithm(window_.back(age).orientation * newest.conjugate());
     }
     const double share = 1 / static_cast<double>(n);
-    rates_.step_to(share * position, exponential(share * turn) * newest, dt);
+    step_to(share * position, exponential(share * turn) * newest, dt);
     return status;
 }
 

@@ -7,8 +7,6 @@
 #include <functional>
 #include <numbers>
 
-#include "tracking/predictor.h"
-
 namespace tracking {
 namespace {
 
@@ -33,7 +31,7 @@ std::string number(double value) {
     return text;
 }
 
-/// Linear between the order statistics (Hyndman and Fan 1996, definition 7, as app/src/statistics has it).
+/// Linear between the order statistics (Hyndman and Fan 1996, definition 7).
 /// `values` is not empty.
 double quantile(std::vector<double> values, double p) {
     std::sort(values.begin(), values.end());
@@ -231,7 +229,8 @@ const StickTrace* stick_named(const Trace& trace, const char* name) {
     return nullptr;
 }
 
-/// The body axis from hand to tip: the trace's shaft, else away from the point that the stick mostly turns about.
+/// The body axis from hand to tip: the trace's shaft, else away from the point that the stick mostly turns
+/// about.
 std::optional<Vector3d> shaft_of(const StickTrace& stick, const Trace& trace) {
     if (trace.shaft) return trace.shaft;
     const Turning turning = turning_of(stick, readings().front());
@@ -240,8 +239,8 @@ std::optional<Vector3d> shaft_of(const StickTrace& stick, const Trace& trace) {
     return -turning.pivot.normalized();
 }
 
-/// Where a shaft points, averaged with the square of the speed of its turning as weight: sticks at rest point anywhere, back over the
-/// shoulder too, but who swings one swings it ahead.
+/// Where a shaft points, averaged with the square of the speed of its turning as weight: sticks at rest point
+/// anywhere, back over the shoulder too, but who swings one swings it ahead.
 Vector3d mean_while_swinging(const StickTrace& stick, const Vector3d& shaft) {
     Vector3d sum = Vector3d::Zero();
     double weights = 0;

@@ -7,7 +7,6 @@
 
 #include "trace/parameter_check.h"
 #include "trace/random_stream.h"
-#include "tracking/predictor.h"
 #include "tracking/rotation.h"
 
 namespace tracking {
