@@ -46,7 +46,7 @@ floors() {
         case " $* " in *" $folder "*) ;; *) complain "$area/src/$folder has no place among the floors" ;; esac
     done
 }
-floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare training latency realtime commands
+floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare latency realtime commands
 floors tracking trace drummer filter learned
 floors sim bytes shape modes struck world messages shared workers
 exit $status

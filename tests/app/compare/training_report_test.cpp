@@ -1,4 +1,4 @@
-#include "training/train.h"
+#include "compare/training_report.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,8 @@
 
 namespace app {
 
-/// Where a model comes from: the program's version, the command, the recordings with their SHA-256, whether they
-/// are synthetic, and the errors on what was held out.
+/// Where a model comes from: the program's version, the command, the recordings with their SHA-256, whether
+/// they are synthetic, and the errors on what was held out.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> provenance_of(
     std::span<const Recording> recordings, const TrainingField& field,
     const tracking::TrainingOptions& options, const tracking::TrainingResult& result,
