@@ -37,7 +37,8 @@ public:
     [[nodiscard]] SampleStatus correct(const PoseSample& sample) noexcept override;
     [[nodiscard]] PosePrediction predict(double lead_s) const noexcept override;
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
-    /// That of the mixture, moved on while the modes go on switching in steps like the newest.
+    /// Covariance of the mixture, propagated over the lead; the modes go on switching in steps like the
+    /// newest.
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     [[nodiscard]] std::optional<Motion> motion() const noexcept override { return rotation_.motion(mean_); }
 
@@ -59,7 +60,7 @@ private:
     SampleStatus start(const PoseSample& sample) noexcept;
     SampleStatus update(const PoseSample& sample) noexcept;
     [[nodiscard]] Modes mixed(double dt) const noexcept;
-    /// What the modes' probabilities become over dt: the chain's steps.
+    /// The modes' probabilities after a step dt of the Markov chain.
     [[nodiscard]] Probabilities switched(const Probabilities& mu, double dt) const noexcept;
     /// Covariance of the mixture now.
     [[nodiscard]] AxisMatrix<Lanes> mixture() const noexcept;

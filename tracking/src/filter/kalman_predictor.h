@@ -11,7 +11,7 @@ namespace tracking {
 struct KalmanOptions {
     double gate_sigmas = 0;  ///< <= 0: no gate. Otherwise impossible samples (OutlierGate) answer `outlier`
     double steady_rate_hz = 0;  ///< > 0: the steady gain of this rate (PositionFilter)
-    /// Of the rotation, scaled likewise, where it differs from the position's.
+    /// Model of the rotation, as the motion of a point at the tip (kLever); none: the position's model.
     std::optional<MotionModel> turning = std::nullopt;
 };
 

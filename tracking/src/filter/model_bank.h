@@ -36,9 +36,9 @@ public:
         return predict_model(selected_, lead_s);
     }
     [[nodiscard]] double time_s() const noexcept override { return clock_.time_s(); }
-    /// Of the selected model's prediction if one of the models is true, each as likely as its innovations of
-    /// the last kEvidence samples say: sum_i w_i (P_i + d_i d_i^T), d_i from the selected prediction to the
-    /// model's.
+    /// Covariance of the mixture of the models about the selected prediction: sum_i w_i (P_i + d_i d_i^T),
+    /// with the probability w_i of model i by its innovations of the last kEvidence samples, and d_i from the
+    /// selected prediction to that of model i.
     [[nodiscard]] std::optional<PoseCovariance> covariance(double lead_s) const noexcept override;
     /// That of the selected model.
     [[nodiscard]] std::optional<Motion> motion() const noexcept override {
@@ -63,7 +63,7 @@ private:
         std::array<AxisStates, kModels> x;
         std::array<AxisMatrix<double>, kModels> p{};
         PerModel innovation_square{},
-            innovation_variance{1, 1, 1};  ///< 0 and 1 at a start, which tells nothing
+            innovation_variance{1, 1, 1};  ///< 0 and 1 at a start: no evidence for any model
     };
 
     SampleStatus start(const PoseSample& sample) noexcept;

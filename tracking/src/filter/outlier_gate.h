@@ -5,13 +5,14 @@ namespace tracking {
 
 inline constexpr double kLever = 0.4;  ///< a stick's length [m]: turns rad into metres at the tip
 
-/// Refuses measurements that a stick cannot have made: a step faster than `fastest` from the last one taken,
-/// or one that surprises both the filter, by more than `sigmas` standard deviations, and mechanics: it lies
-/// further from straight on than a reversal of the recent speed and the acceleration `strongest` explain, 2
-/// speed dt + strongest dt^2 / 2. The recent speed is the greater of the last two measured steps', so
-/// contacts pass; the second test waits until there are two. The limits grow with the time since the last
-/// measurement taken, and the third refusal in a row means that the new place is real: what persists is
-/// accepted, by starting anew.
+/// Refuses measurements that a stick cannot have made:
+///   - a step from the last measurement taken that is faster than `fastest`;
+///   - one that is both more than `sigmas` standard deviations from the filter's prediction, and further from
+///     straight on than 2 speed dt + strongest dt^2 / 2, which a reversal of the recent speed and the
+///     acceleration `strongest` can explain. The recent speed is the greater of the last two measured steps',
+///     so contacts pass. Before there are two steps this is not tested.
+/// The limits grow with the time since the last measurement taken. The third measurement that would be
+/// refused in a row is taken as real (Verdict::persists): the filter then starts anew there.
 class OutlierGate {
 public:
     enum class Verdict { pass, refuse, persists };

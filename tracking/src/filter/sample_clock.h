@@ -5,7 +5,7 @@
 
 namespace tracking {
 
-/// Decides what a new sample is to an estimator, before its values are used.
+/// Judges a new sample before an estimator uses its values: newer, after a gap, or not usable.
 class SampleClock {
 public:
     /// accepted, not_newer, not_finite (also a quaternion whose norm is not near 1), or reinitialised: the
@@ -16,8 +16,8 @@ public:
         if (!(sample.t_s > t_s_)) return SampleStatus::not_newer;
         return sample.t_s - t_s_ > kGapS ? SampleStatus::reinitialised : SampleStatus::accepted;
     }
-    /// What most estimators do with a judgement: `update(sample)` takes an accepted one, `start(sample)`
-    /// starts anew from it, and each says what became of it; others are refused.
+    /// Judges a sample and calls `update(sample)` for an accepted one, `start(sample)` for one that starts
+    /// the estimator anew. Returns their answer, or the judgement for samples that are refused.
     template <class Start, class Update>
     [[nodiscard]] SampleStatus take(const PoseSample& sample, const Start& start,
                                     const Update& update) const noexcept {

@@ -12,7 +12,7 @@ using ContactOutputs = Eigen::Matrix<float, static_cast<int>(kContactOutputs), 1
 
 /// All inputs of the network of contacts (contact_times()).
 void look_at(const TipView& view, const Plane& plane, ContactInputs& inputs) noexcept;
-/// Whether a plane is near enough: it is learned from such planes alone.
+/// Whether a plane is near enough for the network: the training has such planes alone.
 [[nodiscard]] bool in_reach(const TipView& view, const Plane& plane) noexcept;
 
 }  // namespace tracking

@@ -13,8 +13,8 @@
 
 namespace tracking {
 
-/// What a network says of its errors at a lead: of a position error e (forward, up, across; over speed 1 s) the
-/// whitened one is
+/// The distribution of a network's errors at a lead, as its outputs state it. A position error e (forward,
+/// up, across; over speed 1 s) is whitened to
 ///   w_i = exp(-log_spread_i) (e_i + sum over j < i of regression_ij e_j),
 /// standard normal if the network is right; each component of kLever times the shaft's error has the standard
 /// deviation exp(log_shaft). Seven outputs: log_spread 0 to 2, regression 10, 20, 21, log_shaft.
@@ -28,11 +28,12 @@ struct ErrorShape {
 [[nodiscard]] ErrorShape shape_of(const Eigen::Ref<const Eigen::VectorXf>& spreads,
                                   std::size_t lead) noexcept;
 
-/// The path of one stick as a network answers it: position and direction of the shaft at any lead.
+/// The path of one stick from a network's outputs: position and direction of the shaft at any lead.
 ///
-/// Between the leads of the answers cubic Hermite pieces whose slopes are those of the parabola through three
-/// neighbours, the newest sample being the first node; beyond the last lead what was added stays. The
-/// orientation turns the newest one by the shortest way that brings the shaft into its direction.
+/// The residuals at kPathLeads are interpolated by cubic Hermite pieces whose slopes are those of the
+/// parabola through three neighbours, the newest sample being the first node. Beyond the last lead the
+/// residual stays constant. The orientation is the newest one, turned by the shortest rotation that brings
+/// the shaft into the predicted direction.
 class LearnedPath {
 public:
     LearnedPath() = default;
@@ -40,16 +41,16 @@ public:
         : frame_(frame), orientation_(orientation), means_(means) {}
 
     [[nodiscard]] PosePrediction after(double lead_s) const noexcept;
-    /// Of the errors, as the network states it.
+    /// Covariance of the errors, as the network states it.
     [[nodiscard]] PoseCovariance covariance(double lead_s, const PathSpreads& spreads) const noexcept;
     [[nodiscard]] const PathFrame& frame() const noexcept { return frame_; }
 
 private:
-    /// What is added at a lead, with its slope over the lead; in the axes of the frame, over the speed.
+    /// The residual at a lead, with its slope over the lead; in the axes of the frame, over the speed.
     struct Added {
         Eigen::Vector3d value, slope;
     };
-    /// To the position (`first` = 0) or to kLever times the direction (3).
+    /// Residual of the position (`first` = 0) or of kLever times the direction (3).
     [[nodiscard]] Added added(double lead_s, Eigen::Index first) const noexcept;
     [[nodiscard]] PoseCovariance covariance_at(std::size_t node, const PathSpreads& spreads) const noexcept;
 
@@ -58,9 +59,9 @@ private:
     PathMeans means_ = PathMeans::Zero();
 };
 
-/// Predictors `learned` and `online`: a network alone, whose last layer learns from what turns out if it has a memory.
-/// Starts anew after a gap, with what it has learned; with one sample only it holds. Examples are at least
-/// kExampleS apart. Allocates when it is made only.
+/// Predictors `learned` and `online`: a network alone. With a memory its last layer learns from the samples
+/// (OnlineLayer), from examples at least kExampleS apart. After a gap the history starts anew, and what was
+/// learned stays. With one sample only it predicts that sample. Allocates when it is made only.
 class Learned final : public Predictor {
 public:
     /// `memory_s`: of OnlineLayer; 0: learns nothing.
@@ -76,16 +77,16 @@ public:
     }
     [[nodiscard]] bool heeds_orientation() const noexcept override { return true; }
     [[nodiscard]] const LearnedPath& path() const noexcept { return path_; }
-    /// What the network says of the errors of path().
+    /// The spreads that the network states for path().
     [[nodiscard]] PathSpreads spreads() const noexcept;
-    /// The next sample begins a motion that the ones before say nothing of.
+    /// Clears the history of samples: the next one is treated as the first.
     void forget() noexcept;
     [[nodiscard]] const OnlineLayer* online() const noexcept { return online_ ? &*online_ : nullptr; }
 
 private:
     static constexpr double kExampleS = 1.0 / 250;
 
-    /// What an example was seen as, until it is known what became of it.
+    /// An example whose longest lead has not passed yet.
     struct Example {
         double t_s = 0, dt_s = 0;
         PathFrame frame;

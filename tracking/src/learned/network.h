@@ -10,9 +10,9 @@ namespace tracking {
 inline constexpr std::array<double, 5> kPathLeads = {1.0 / 60, 1.0 / 30, 1.0 / 15, 1.0 / 10, 0.15};
 inline constexpr std::size_t kNodes = kPathLeads.size();
 
-/// A network's outputs: for each lead first what is added to the fading position, and kLever times what is
-/// added to the fading direction, in the axes of the PathFrame and over speed 1 s (means); then for each lead the
-/// numbers of an ErrorShape (spreads).
+/// A network's outputs. First the means, for each lead: the residual of the fading position, and kLever times
+/// that of the fading direction, in the axes of the PathFrame and over speed 1 s. Then the spreads, for each
+/// lead: the numbers of an ErrorShape.
 inline constexpr int kShapeNumbers = 7;
 inline constexpr std::size_t kPathMeans = 6 * kNodes, kPathSpreads = kShapeNumbers * kNodes,
                              kPathOutputs = kPathMeans + kPathSpreads;
@@ -22,18 +22,18 @@ using PathSpreads = Eigen::Matrix<float, static_cast<int>(kPathSpreads), 1>;
 /// The slope of f left of zero.
 inline constexpr float kLeak = 0.1F;
 
-/// A path model laid out to be run: rows are padded to whole packets of the processor, so that a product keeps its
-/// sums in registers. Sums run over the columns in order: the same bits on one kind of processor. Allocates when it is
-/// made only.
+/// A path model laid out to be run: rows are padded to whole packets of the processor, so that a product
+/// keeps its sums in registers. Sums run over the columns in order: the same bits on one kind of processor.
+/// Allocates when it is made only.
 class Network {
 public:
-    /// Of the second hidden layer, zero beyond the layer's units.
+    /// Values of the second hidden layer, zero beyond the layer's units.
     using Hidden =
         Eigen::Matrix<float, Eigen::Dynamic, 1, 0, static_cast<int>(PathModel::kMostHidden) + 16, 1>;
 
     explicit Network(const PathModel& model);
 
-    /// Of inputs without a direction of the shaft its columns are passed over.
+    /// Where the shaft's direction is not known its inputs are zero, and their columns are skipped.
     void find_hidden(const StickHistory::Inputs& inputs, Hidden& hidden) const noexcept;
     [[nodiscard]] PathMeans means(const Hidden& hidden) const noexcept;
     [[nodiscard]] PathSpreads spreads(const Hidden& hidden) const noexcept;

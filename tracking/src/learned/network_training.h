@@ -20,19 +20,20 @@ using Layers = std::array<PathModel::Layer, 3>;
 [[nodiscard]] Layers initial_layers(std::size_t inputs, std::size_t hidden, std::size_t outputs,
                                     RandomStream& random);
 void run_forward(const Layers& layers, const Eigen::MatrixXf& inputs, Activations& activations);
-/// `outputs_gradient`: of a loss by the outputs; writes the loss's gradient by weights and biases.
+/// Backpropagation: from the gradient of a loss by the outputs to that by weights and biases, `gradient`.
 void run_backward(const Layers& layers, const Eigen::MatrixXf& inputs, const Activations& activations,
                   const Eigen::MatrixXf& outputs_gradient, Layers& gradient);
 
-/// Inputs are learned from as (x - mean) / deviation. Across has no mean, so that mirroring is a sign: the third of each
-/// vector of a StickHistory, with which inputs begin, and `across`.
+/// Standardises inputs for training: (x - mean) / deviation. Components across the motion (the third of each
+/// vector of a StickHistory, with which inputs begin, and the inputs `across`) get a mean of 0, so that
+/// mirroring changes their sign.
 struct InputScaling {
     Eigen::VectorXf mean, deviation;
 
     /// Columns are examples.
     explicit InputScaling(const Eigen::MatrixXf& inputs, std::initializer_list<Eigen::Index> across = {});
     void apply(Eigen::MatrixXf& inputs) const;
-    /// Into the first layer.
+    /// Changes the first layer so that it takes inputs as they are.
     void fold_into(PathModel::Layer& layer) const;
 };
 

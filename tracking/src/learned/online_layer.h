@@ -6,21 +6,22 @@
 
 namespace tracking {
 
-/// The last layer of a network, learned while the player plays: ridge regression that forgets, drawn to what the
-/// model said.
+/// The last layer of a network, learned while the player plays: ridge regression with exponential forgetting,
+/// regularised towards the model's weights.
 ///
 ///   W = arg min  sum_i l_i |y_i - W x_i|^2 + d |W - W0|^2,   l_i = exp(-age_i / T) v_i^2 dt_i / (1/60 s)
 ///     = W0 + B (A + d I)^-1,   A = sum_i l_i x_i x_i^T,  B = sum_i l_i (y_i - W0 x_i) x_i^T
 ///
 ///   x  n      the second hidden layer's values, and 1
-///   y  30     the residuals that came (outputs `means` of the network), v the PathFrame's speed [m/s], so that
+///   y  30     the true residuals (outputs `means` of the network), v the PathFrame's speed [m/s], so that
 ///             errors count in metres, and dt the time since the example before
-///   W0 30 x n the model's last layer, d = kDraw: with few examples nothing moves far, and where the player does
-///             nothing new, forgetting ends at the model
+///   W0 30 x n the model's last layer, d = kDraw: W stays near it with few examples, and returns to it when
+///             there are no new ones
 ///
-/// All leads are learned when the longest has come, so that they share A. A + d I is positive definite whatever
-/// comes: d is some 1e7 times the rounding of A. n (n + 60) / 2 multiplications per example; every kEvery
-/// examples, counted and not timed, n^3 / 6 + 30 n^2 for the solution. Allocates when it is made only.
+/// An example is learned once its longest lead has passed, so that all leads share A. A + d I is positive
+/// definite for any input: d is some 1e7 times the rounding of A. n (n + 60) / 2 multiplications per example;
+/// every kEvery examples, counted and not timed, n^3 / 6 + 30 n^2 for the solution. Allocates when it is made
+/// only.
 class OnlineLayer {
 public:
     static constexpr double kDraw = 2;
@@ -29,11 +30,11 @@ public:
     /// `memory_s`: T.
     OnlineLayer(const Network& network, double memory_s);
 
-    /// True if W is new. `known_shaft`: otherwise the residuals of directions teach nothing.
+    /// Adds an example; true if W was solved anew. `known_shaft`: whether the residuals of directions count.
     bool learn(const Network::Hidden& hidden, const PathMeans& residuals, bool known_shaft, double speed,
                double dt_s) noexcept;
     [[nodiscard]] const Eigen::MatrixXf& weights() const noexcept { return weights_; }  ///< 30 x n, bias last
-    /// What another stick has learned from the same model; solve() then finds the W of both.
+    /// Adds the sums of another stick with the same model; solve() then finds the W of both.
     void add(const Experience& other);
     [[nodiscard]] Experience experience() const { return {moments_, against_, {}}; }
     void solve() noexcept;

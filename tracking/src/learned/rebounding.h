@@ -9,17 +9,18 @@
 
 namespace tracking {
 
-/// Another predictor's path, which rebounds from the height at which the stick's strokes turn back up.
+/// The path of another predictor, reflected at the height h at which the stick's strokes turn back up.
 ///
 ///   y = h - d under h becomes h + e d,  e = (sum w d y - c) / (sum w d^2 + c),  -1 <= e <= 1.5
 ///   vy becomes -e vy
 ///
-/// for each lead, with y the height over h that turned out, w = dt exp(-age / 10 s) and c = 1.7 cm^2 s. So e is the
-/// restitution of least squares, and what the hand adds to it; it begins with -1, the path as it is, and stays there where
-/// a stick passes. h is the mean of the lows before, each weighing 1/5: where the measured point has fallen by 25 mm and
-/// risen by as much again. What was learned outlasts gaps.
+/// for each lead, with y the true height over h, w = dt exp(-age / 10 s) and c = 1.7 cm^2 s. So e is the
+/// coefficient of restitution by least squares, the hand's part included. It begins with -1, which leaves the
+/// path as it is, and stays there where a stick passes through. A low is where the measured point has fallen
+/// by 25 mm and risen by as much again; h is the mean of the lows, after the fifth an exponential one in
+/// which the newest weighs 1/5. What was learned outlasts gaps.
 ///
-/// Stated covariances are those of the other. World frame, y up. Allocates when it is made only.
+/// States the covariance of the other predictor. World frame, y up. Allocates when it is made only.
 class Rebounding final : public Predictor {
 public:
     explicit Rebounding(std::unique_ptr<Predictor> path);
@@ -33,7 +34,7 @@ public:
     [[nodiscard]] bool heeds_orientation() const noexcept override { return path_->heeds_orientation(); }
 
 private:
-    /// A prediction under the lows, until its time comes.
+    /// A prediction under h for a time that has not come yet.
     struct Pending {
         double due_s = 0, depth_m = 0, low_m = 0, weight_s = 0;
     };

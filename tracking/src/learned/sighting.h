@@ -5,8 +5,8 @@
 
 namespace tracking {
 
-/// How a network sees a recorded stick once while it learns: by which sensor, and as what other motion. Few recordings are thus
-/// many, of which none can be known by heart.
+/// One augmentation of a recorded stick for training: the sensor that samples it, and a scaling of its motion
+/// in time and space. A few recordings so give many different examples.
 struct Sighting {
     SensorModel sensor;
     bool orientation = true;  ///< whether the sensor reports it
@@ -18,9 +18,10 @@ struct Sighting {
     [[nodiscard]] StickTrace seen(StickTrace stick) const;
 };
 
-/// 60 Hz within 3 %, 0.25 mm of noise; without orientation three times out of ten. If not `plain` three out of five are of 30 to
-/// 150 Hz, half of these with up to 4 ms of jitter, half with up to 15 % lost; times change by up to exp(0.6), sizes by
-/// exp(0.4), heights by exp(0.2), and the vertical turns by 0.15 rad (standard deviation, each axis).
+/// 60 Hz within 3 %, 0.25 mm of noise; without orientation three times out of ten. If not `plain` three out
+/// of five are of 30 to 150 Hz, half of these with up to 4 ms of jitter, half with up to 15 % lost; times
+/// change by up to exp(0.6), sizes by exp(0.4), heights by exp(0.2), and the vertical turns by 0.15 rad
+/// (standard deviation, each axis).
 [[nodiscard]] Sighting random_sighting(std::uint64_t seed, bool plain);
 
 }  // namespace tracking

@@ -8,12 +8,13 @@
 
 namespace tracking {
 
-/// Where a stick is, how it moves, and the axes and the unit in which its recent motion looks alike wherever
-/// the kit stands and whichever way it faces. World frame, SI.
+/// Where a stick is and how it moves, and the axes and the unit of length of a network's inputs and outputs.
+/// Both follow the recent motion, so that a network's answer does not depend on where the kit stands or which
+/// way it faces. World frame, SI.
 struct PathFrame {
     Eigen::Vector3d position = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();
-    /// Of the shaft, a unit vector from hand to tip, and its angular velocity [rad/s], which has no part about
-    /// the shaft; both zero without orientations.
+    /// Of the shaft, a unit vector from hand to tip, and its angular velocity [rad/s], which has no part
+    /// about the shaft; both zero without orientations.
     Eigen::Vector3d direction = Eigen::Vector3d::Zero(), angular_velocity = Eigen::Vector3d::Zero();
     double cosine = 1, sine = 0;  ///< forward is the horizontal unit vector (cosine, 0, sine)
     double speed = 1;             ///< RMS of the recent motion [m/s], > 0
@@ -28,11 +29,13 @@ struct PathFrame {
     [[nodiscard]] Eigen::Vector3d faded_direction(double lead_s) const noexcept;
 };
 
-/// A velocity that fades at this rate [1/s] errs least of all that are extrapolated (predictor `cv:decay=8`).
+/// The rate [1/s] at which extrapolated velocities fade, as in predictor `cv:decay=8`: the one with the least
+/// errors.
 inline constexpr double kFadingRate = 8;
 /// The way that a unit velocity makes in `lead_s` while it fades [s].
 [[nodiscard]] double fading_way(double lead_s) noexcept;
-/// The newest 0.25 s of one stick, and what a network sees of it.
+
+/// The newest 0.25 s of one stick, and the inputs of a network that follow from them.
 ///
 /// The inputs, in the axes and the unit (speed) of the PathFrame:
 ///   - mean velocities of the tracked point between fixed ages (kAges), positions there being interpolated
@@ -64,7 +67,8 @@ public:
     /// A sample newer than the ones before; without orientation the shaft stays where it was.
     void push(const PoseSample& sample) noexcept;
     [[nodiscard]] std::size_t held() const noexcept { return held_; }
-    /// Where the stick was at a time between two samples held; false for others. Without orientation `direction` is zero.
+    /// Where the stick was at a time between two samples held; false for others. Without orientation
+    /// `direction` is zero.
     [[nodiscard]] bool find(double t_s, Eigen::Vector3d& position, Eigen::Vector3d& direction) const noexcept;
     /// Writes the inputs; at least two samples must be held.
     [[nodiscard]] PathFrame look(Inputs& inputs) const noexcept;

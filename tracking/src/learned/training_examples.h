@@ -10,7 +10,7 @@
 
 namespace tracking {
 
-/// What a network learns from: columns are examples.
+/// Training examples, one a column.
 struct Examples {
     Eigen::MatrixXf inputs;    ///< kInputs
     Eigen::MatrixXf means;     ///< kPathMeans: the residuals, as the network's outputs
@@ -34,7 +34,7 @@ private:
     std::size_t count_ = 0;
 };
 
-/// Input vectors, and means and spreads of the outputs, as if left were right: across changes its sign.
+/// Mirrors an example left to right: components across the motion change their sign.
 void mirror(Eigen::Ref<Eigen::VectorXf> inputs, Eigen::Ref<Eigen::VectorXf> means);
 
 }  // namespace tracking

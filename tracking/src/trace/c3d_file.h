@@ -11,9 +11,9 @@
 namespace tracking {
 
 /// The 3D points of a C3D file (c3d.org, "The C3D File Format User Guide"): integer or floating-point frames
-/// written by Intel, DEC or MIPS processors. Analog channels are skipped. Of the parameters it reads POINT:USED,
-/// SCALE, RATE, UNITS, FRAMES, LONG_FRAMES, LABELS, LABELS2 .., DATA_START, X_SCREEN and Y_SCREEN, and
-/// TRIAL:ACTUAL_START_FIELD and ACTUAL_END_FIELD; where there are none, the header's values.
+/// written by Intel, DEC or MIPS processors. Analog channels are skipped. Of the parameters it reads
+/// POINT:USED, SCALE, RATE, UNITS, FRAMES, LONG_FRAMES, LABELS, LABELS2 .., DATA_START, X_SCREEN and
+/// Y_SCREEN, and TRIAL:ACTUAL_START_FIELD and ACTUAL_END_FIELD; where there are none, the header's values.
 ///
 /// `bytes` and `name` must outlive it. Throws TraceError with the byte of the fault. Memory is bounded by the
 /// file's size; points are read where they lie.

@@ -5,8 +5,8 @@
 
 namespace tracking {
 
-/// A date and time, or a time of day, as ISO 8601 writes it, in seconds since 1970 or midnight, UTC where the zone is
-/// said.
+/// A date and time, or a time of day, as ISO 8601 writes it, in seconds since 1970 or midnight, UTC where the
+/// zone is said.
 struct IsoTime {
     enum class Form { time_of_day, local, zoned };
     std::int64_t whole_s = 0;
@@ -14,9 +14,9 @@ struct IsoTime {
     Form form = Form::local;
 };
 
-/// Reads YYYY-MM-DDThh:mm:ss[.f][zone], YYYYMMDDThhmmss[.f][zone] (a blank or t may stand for T), or hh:mm:ss[.f];
-/// the fraction after a point or a comma, the zone Z, +hh, +hhmm or +hh:mm (or -). Second 60 is the next minute's
-/// first. None for anything else.
+/// Reads YYYY-MM-DDThh:mm:ss[.f][zone], YYYYMMDDThhmmss[.f][zone] (a blank or t may stand for T), or
+/// hh:mm:ss[.f]; the fraction after a point or a comma, the zone Z, +hh, +hhmm or +hh:mm (or -). Second 60 is
+/// the next minute's first. None for anything else.
 [[nodiscard]] std::optional<IsoTime> iso_time(std::string_view text);
 
 /// From a to b [s]. Whole seconds are subtracted first, so that a fraction keeps its digits.

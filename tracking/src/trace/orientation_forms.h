@@ -13,10 +13,10 @@ namespace tracking {
 [[nodiscard]] Eigen::Vector3d from_z_up(const Eigen::Vector3d& v);
 [[nodiscard]] Eigen::Quaterniond from_z_up(const Eigen::Quaterniond& q);
 
-/// What is said of axes, of the world and of bodies alike: three letters for where x, y and z point (R or L for
-/// right or left, U or D for up or down, F or B for forward or back), "unity" (RUF) or "unreal" (FRU). The
-/// matrix M takes such coordinates to ours (RUB): p' = M p. Its columns are where the axes point, its entries 0,
-/// 1 and -1; det M = -1 if the axes are left-handed. None for anything else.
+/// What is said of axes, of the world and of bodies alike: three letters for where x, y and z point (R or L
+/// for right or left, U or D for up or down, F or B for forward or back), "unity" (RUF) or "unreal" (FRU).
+/// The matrix M takes such coordinates to ours (RUB): p' = M p. Its columns are where the axes point, its
+/// entries 0, 1 and -1; det M = -1 if the axes are left-handed. None for anything else.
 [[nodiscard]] std::optional<Eigen::Matrix3d> axes_of(const std::string& frame);
 
 /// The rotation in our coordinates, of world and body: R' = M R M^T. With N = det(M) M, which is a rotation,
