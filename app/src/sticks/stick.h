@@ -144,7 +144,7 @@ public:
     [[nodiscard]] sim::TipPath predicted_path(std::size_t model) const;
     /// The path of the confirming filter, where there is one.
     [[nodiscard]] std::optional<sim::TipPath> confirming_path() const;
-    /// The tip as a network sees it, of the samples that take() was given; false where it has too few.
+    /// The network's inputs from the samples that take() was given; false where there are too few.
     [[nodiscard]] bool look(tracking::TipView& view) const { return history_.look(view); }
     [[nodiscard]] double sound_lead_s() const { return sound_lead_s_; }
     [[nodiscard]] sim::TipPath measured_path() const;

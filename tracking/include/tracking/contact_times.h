@@ -30,7 +30,7 @@ struct ContactTimes {
     [[nodiscard]] double median_s() const noexcept;
 };
 
-/// A tip as a network sees it: plain numbers.
+/// The network's inputs for a tip, and the axes and the speed that they refer to: plain numbers.
 struct TipView {
     static constexpr std::size_t kInputs = 88;
     Eigen::Vector3d tip = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();  ///< world, SI

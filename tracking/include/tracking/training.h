@@ -63,9 +63,9 @@ struct TrainingResult {
 /// cosine; the last weights are kept.
 ///
 /// That is done twice, with the same settings: first without the sticks held out, on which this network is
-/// scored, and by which the covariances are scaled for each lead so that the regions of 50 and 95 % hold of
-/// the held-out errors what they say, as nearly as one factor can; then, for the model, from all sticks. So
-/// the scores are of what was not learned from, and nothing recorded is wasted.
+/// scored. On them the covariances are scaled for each lead, so that the regions of 50 and 95 % hold these
+/// shares of the held-out errors as nearly as one factor allows. Then, for the model, it learns from all
+/// sticks. So the scores are of sticks that were not learned from, and the model uses all recordings.
 ///
 /// Last, if asked, the network of contacts (PathModel::contacts) is learned from the sticks that are not held
 /// out. It is left out of the model unless its held-out loss is below 0.7 of that of the constant answer.
