@@ -27,7 +27,8 @@ zmq:sim|app
 mujoco/|bt[A-Z]|Bullet:sim
 CLI/|toml\+\+/|nlohmann/|lo/:app
 LIST
-# The folders of a library, from the ground up: each includes those before it in the list alone, so there is no circle.
+# The folders of a library, from the ground up: each includes those before it in the list alone, so there is no circle. Files beside
+# the folders stand above all of them.
 floors() {
     local area=$1 below=" " folder line
     shift
@@ -41,6 +42,7 @@ floors() {
         done < <(grep -rnE '^#include "[a-z_]+/' "$area/src/$folder" --include='*.h' --include='*.cpp')
         below="$below$folder "
     done
+    while IFS= read -r line; do complain "$line: a file above the folders"; done < <(grep -rnE '^#include "[a-z0-9_]+\.h"' "$area"/src/*/)
     for folder in "$area"/src/*/; do
         folder=$(basename "$folder")
         case " $* " in *" $folder "*) ;; *) complain "$area/src/$folder has no place among the floors" ;; esac
