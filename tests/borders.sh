@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Fails on an include that crosses the borders: tracking, sim, render and audio know themselves alone, app knows all, nothing includes app or tests;
-# and within app and sim on an arrow from a folder to one above it.
+# and within app, sim and tracking on an arrow from a folder to one above it.
 set -u
 cd "$(dirname "$0")/.."
 status=0
@@ -27,7 +27,8 @@ zmq:sim|app
 mujoco/|bt[A-Z]|Bullet:sim
 CLI/|toml\+\+/|nlohmann/|lo/:app
 LIST
-# The folders of a library, from the ground up: each includes those before it in the list alone, so there is no circle.
+# The folders of a library, from the ground up: each includes those before it in the list alone, so there is no circle. Files beside
+# the folders stand above all of them.
 floors() {
     local area=$1 below=" " folder line
     shift
@@ -41,11 +42,13 @@ floors() {
         done < <(grep -rnE '^#include "[a-z_]+/' "$area/src/$folder" --include='*.h' --include='*.cpp')
         below="$below$folder "
     done
+    while IFS= read -r line; do complain "$line: a file above the folders"; done < <(grep -rnE '^#include "[a-z0-9_]+\.h"' "$area"/src/*/)
     for folder in "$area"/src/*/; do
         folder=$(basename "$folder")
         case " $* " in *" $folder "*) ;; *) complain "$area/src/$folder has no place among the floors" ;; esac
     done
 }
-floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare training latency realtime commands
+floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare latency realtime commands
+floors tracking trace drummer filter learned
 floors sim bytes shape modes struck body contact solver world messages shared workers
 exit $status

@@ -64,13 +64,13 @@ inline app::PlayResult sample_play_result() {
     for (int i = 0; i < 72000; ++i) {
         const float sample =
             0.5F * std::sin(static_cast<float>(i) * 0.05F) * std::exp(-static_cast<float>(i) / 20000);
-        r.audio.append(std::array{sample, 0.5F * sample});
+        r.sound.samples.append(std::array{sample, 0.5F * sample});
     }
     r.wall_s = 0.5;
     r.stages_s = {{"tracking", 0.1}, {"drawing", 0.3}};
     r.options.workers = 1;
-    r.inputs = {{r.trace, std::string(64, 'a')}, {r.options.kit.string(), std::string(64, 'b')}};
-    r.fingerprint = "0123456789abcdef";
-    r.versions = {{"csound", "6.18"}};
+    r.origin.inputs = {{r.trace, std::string(64, 'a')}, {r.options.kit.string(), std::string(64, 'b')}};
+    r.origin.fingerprint = "0123456789abcdef";
+    r.origin.versions = {{"csound", "6.18"}};
     return r;
 }

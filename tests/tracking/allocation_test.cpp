@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "model_of_random_weights.h"
+#include "learned/model_of_random_weights.h"
 #include "tracking/contact_times.h"
 #include "tracking/known_motion.h"
 #include "tracking/predictor.h"

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "random_stream.h"
+#include "trace/random_stream.h"
 #include "tracking/predictor.h"
 
 namespace tracking {

@@ -82,28 +82,16 @@ struct Reads {
     }
 };
 
-/// Publishes 1, 2, ... until it is told to stop; `period` zero: as fast as it can.
-class Writer {
-public:
-    Writer(Newest& newest, std::chrono::microseconds period)
-        : thread_([this, &newest, period] {
-              auto due = steady_clock::now();
-              for (std::uint64_t number = 1; !stop_.load(std::memory_order_relaxed); ++number) {
-                  newest.publish(payload(number));
-                  if (period.count() > 0) std::this_thread::sleep_until(due += period);
-              }
-          }) {}
-    ~Writer() {
-        stop_ = true;
-        thread_.join();
-    }
-    Writer(const Writer&) = delete;
-    Writer& operator=(const Writer&) = delete;
-
-private:
-    std::atomic<bool> stop_{false};
-    std::thread thread_;
-};
+/// Publishes 1, 2, ... until the thread is told to stop; `period` zero: as fast as it can.
+std::jthread writer(Newest& newest, std::chrono::microseconds period) {
+    return std::jthread([&newest, period](const std::stop_token& stop) {
+        auto due = steady_clock::now();
+        for (std::uint64_t number = 1; !stop.stop_requested(); ++number) {
+            newest.publish(payload(number));
+            if (period.count() > 0) std::this_thread::sleep_until(due += period);
+        }
+    });
+}
 
 void print(const char* what, const Reads& reads, steady_clock::time_point begin) {
     const std::chrono::duration<double> wall = steady_clock::now() - begin;
@@ -118,7 +106,7 @@ void print(const char* what, const Reads& reads, steady_clock::time_point begin)
 Reads read_while_writing(const char* what, std::chrono::microseconds period) {
     const SharedMemory memory;
     const auto begin = steady_clock::now();
-    const Writer writer(memory.newest(), period);
+    const std::jthread thread = writer(memory.newest(), period);
     while (!memory.newest().read()) sched_yield();
     Reads reads;
 #ifdef MUSICWORLD_SANITIZED

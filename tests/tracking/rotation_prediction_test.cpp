@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <sstream>
 
-#include "random_stream.h"
+#include "trace/random_stream.h"
 #include "tracking/predictor.h"
 #include "tracking/rotation.h"
 

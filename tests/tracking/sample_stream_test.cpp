@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <limits>
 
-#include "kalman_predictor.h"
+#include "filter/kalman_predictor.h"
 #include "shared_folder.h"
 #include "simulated_motion.h"
 #include "tracking/drummer.h"
@@ -21,7 +21,7 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kLead = 1.0 / 15;
+constexpr double kLeadS = 1.0 / 15;
 
 PoseSample swing(double t) {
     PoseSample sample = position_sample(t, {0.3 * std::sin(8 * t), 1 + 0.1 * std::cos(11 * t), 0.2 * t});
@@ -54,7 +54,7 @@ TEST_P(Stream, RepeatedLateReorderedAndBrokenSamplesChangeNotOneBitOfWhatFollows
         broken.orientation.coeffs() *= i % 2 == 0 ? kNan : 0;
         EXPECT_EQ(pestered->correct(broken), SampleStatus::not_finite);
         EXPECT_EQ(pestered->correct(swing(kNan)), SampleStatus::not_finite);
-        EXPECT_TRUE(same_bits(clean->predict(kLead), pestered->predict(kLead))) << "sample " << i;
+        EXPECT_TRUE(same_bits(clean->predict(kLeadS), pestered->predict(kLeadS))) << "sample " << i;
     }
 }
 
@@ -65,7 +65,7 @@ TEST_P(Stream, AfterAGapAllThatWasBeforeIsForgotten) {
     for (int i = 0; i < 50; ++i) {
         const double t = 50 / 120.0 + kGapS + i / 120.0;
         EXPECT_EQ(old->correct(swing(t)), fresh->correct(swing(t)));
-        EXPECT_TRUE(same_bits(old->predict(kLead), fresh->predict(kLead))) << "sample " << i;
+        EXPECT_TRUE(same_bits(old->predict(kLeadS), fresh->predict(kLeadS))) << "sample " << i;
     }
 }
 
@@ -86,7 +86,7 @@ TEST_P(Gated, SingleOutliersAndPairsLeaveThePredictionWhereADropOutWould) {
             if (bad) sample.position += Vector3d(0.4, -0.5, 0.3);
             EXPECT_EQ(hit->correct(sample) == SampleStatus::outlier, bad) << i;
         }
-        EXPECT_TRUE(same_bits(hit->predict(kLead), lost->predict(kLead)));
+        EXPECT_TRUE(same_bits(hit->predict(kLeadS), lost->predict(kLeadS)));
     }
 }
 
@@ -115,7 +115,7 @@ TEST_P(Gated, StrokesThatReverseAt5MetresPerSecondWithinASamplePass) {
                     << rate << " Hz, " << i;
                 (void)plain->correct(position_sample(t, p));
                 EXPECT_TRUE(
-                    same_bits(predictor->predict(kLead), plain->predict(kLead)));  // nothing to refuse
+                    same_bits(predictor->predict(kLeadS), plain->predict(kLeadS)));  // nothing to refuse
             }
         }
 }
@@ -132,11 +132,11 @@ TEST(Steady, IsTheConvergedFilterAtItsRate) {
                 (void)steady->correct(swing(i / rate));
             }
             // Positions of some metres times 1e-16 and the gains; velocities are a lead's inverse coarser.
-            const PosePrediction a = settled->predict(kLead), b = steady->predict(kLead);
+            const PosePrediction a = settled->predict(kLeadS), b = steady->predict(kLeadS);
             EXPECT_LT((a.position - b.position).norm(), 1e-12) << name << ' ' << rate;
             EXPECT_LT((a.velocity - b.velocity).norm(), 1e-11) << name << ' ' << rate;
             EXPECT_NEAR(
-                settled->covariance(kLead)->position(0, 0) / steady->covariance(kLead)->position(0, 0), 1,
+                settled->covariance(kLeadS)->position(0, 0) / steady->covariance(kLeadS)->position(0, 0), 1,
                 1e-12)
                 << name << ' ' << rate;
         }
@@ -231,7 +231,7 @@ void add_simulated(Statement& sum, const char* name, const LinearMotion& motion,
     constexpr double kDt = 1.0 / 120;
     RandomStream random(mixed_seed(seed, 1, 2)), losses(mixed_seed(seed, 3, 4));
     const auto predictor = make_predictor(name);
-    const LinearMotion::Step tick = motion.step(kDt), lead = motion.step(kLead);
+    const LinearMotion::Step tick = motion.step(kDt), lead = motion.step(kLeadS);
     AxisColumns x = AxisColumns::Zero();
     int lost = 0;
     for (int k = 0; k < 2400; ++k, x = moved(tick, x, random)) {
@@ -240,7 +240,7 @@ void add_simulated(Statement& sum, const char* name, const LinearMotion& motion,
         const Vector3d z = x.row(0).transpose() + random.normal_vector(0.25e-3);
         if (lost == 0) (void)predictor->correct(position_sample(k * kDt, z));
         const AxisColumns truth = moved(lead, x, random);
-        const double ahead = k * kDt + kLead - predictor->time_s();
+        const double ahead = k * kDt + kLeadS - predictor->time_s();
         if (k >= 60)
             sum.add(truth.row(0).transpose() - predictor->predict(ahead).position, *predictor, ahead);
     }
@@ -308,8 +308,8 @@ void add_recorded(Statement& sum, const char* name, const StickTrace& stick, dou
         const double t = t0 + k / 60.0;
         for (; next < samples.size() && samples[next].t_s <= t + 1e-6; ++next)
             (void)predictor->correct(samples[next]);
-        const auto truth = pose_at(stick, t + kLead);
-        const double ahead = t + kLead - predictor->time_s();
+        const auto truth = pose_at(stick, t + kLeadS);
+        const double ahead = t + kLeadS - predictor->time_s();
         if (k >= 30 && truth)
             sum.add(truth->position - predictor->predict(ahead).position, *predictor, ahead);
     }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "random_stream.h"
+#include "trace/random_stream.h"
 #include "tracking/trace.h"
 
 namespace tracking {

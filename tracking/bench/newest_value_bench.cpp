@@ -39,30 +39,6 @@ double ns_per_tick() {
     return wall.count() / static_cast<double>(__rdtsc() - ticks);
 }
 
-/// Publishes at 1 kHz.
-class Writer {
-public:
-    explicit Writer(Newest& newest)
-        : thread_([this, &newest] {
-              tracking::StickState state;
-              for (auto due = steady_clock::now(); !stop_;
-                   std::this_thread::sleep_until(due += std::chrono::milliseconds(1))) {
-                  ++state.samples;
-                  newest.publish(state);
-              }
-          }) {}
-    ~Writer() {
-        stop_ = true;
-        thread_.join();
-    }
-    Writer(const Writer&) = delete;
-    Writer& operator=(const Writer&) = delete;
-
-private:
-    std::atomic<bool> stop_{false};
-    std::thread thread_;
-};
-
 struct Durations {
     const char* name;
     std::vector<std::uint64_t> ticks;
@@ -108,7 +84,14 @@ Durations empty_queries(std::size_t count) {
 
 int main() {
     const auto newest = std::make_unique<Newest>();
-    const Writer writer(*newest);
+    const std::jthread writer([&newest](const std::stop_token& stop) {
+        tracking::StickState state;
+        for (auto due = steady_clock::now(); !stop.stop_requested();
+             std::this_thread::sleep_until(due += std::chrono::milliseconds(1))) {
+            ++state.samples;
+            newest->publish(state);
+        }
+    });
     const double ns = ns_per_tick();
     constexpr std::size_t kMany = 20'000'000, kFew = 10'000;
     std::printf(

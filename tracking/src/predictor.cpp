@@ -3,17 +3,17 @@
 #include <array>
 #include <cmath>
 
-#include "arbitrated.h"
-#include "extrapolators.h"
-#include "interacting_models.h"
-#include "kalman_predictor.h"
-#include "learned_path.h"
-#include "least_squares.h"
-#include "model_bank.h"
-#include "rebounding.h"
-#include "smoothers.h"
+#include "filter/extrapolators.h"
+#include "filter/interacting_models.h"
+#include "filter/kalman_predictor.h"
+#include "filter/least_squares.h"
+#include "filter/model_bank.h"
+#include "filter/smoothers.h"
+#include "learned/arbitrated.h"
+#include "learned/learned_path.h"
+#include "learned/rebounding.h"
 #include "specification.h"
-#include "text_cursor.h"
+#include "trace/text_cursor.h"
 
 namespace tracking {
 namespace {
@@ -164,7 +164,8 @@ std::unique_ptr<Predictor> make_online(Specification& specification, const Eigen
     return std::make_unique<Learned>(model, shaft, memory(specification));
 }
 
-/// `cv`, whose velocity fades while its turning lasts, and which rebounds where strokes turn.
+/// `cv` whose velocity decays while its angular velocity does not, and which rebounds where strokes turn
+/// back.
 std::unique_ptr<Predictor> make_surface(Specification& specification) {
     const double q = density(specification, "q", 1e7);
     MotionModel fading = constant_velocity(q, specification.number("decay", 8, 1e-3, 1000)),

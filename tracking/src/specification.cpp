@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "text_cursor.h"
+#include "trace/text_cursor.h"
 
 namespace tracking {
 namespace {

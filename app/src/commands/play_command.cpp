@@ -81,16 +81,16 @@ void print_if_apart(const PlayResult& result) {
 /// Says where the sound is not as loud as it was asked for, which its peaks forbid, and where samples clipped.
 void print_if_loud(const PlayResult& result, bool offline) {
     const MixOptions& asked = result.options.mix;
-    const audio::Loudness& loudness = result.loudness;
+    const audio::Loudness& loudness = result.sound.loudness;
     const bool brought = offline && !asked.gain_db && !result.options.solo && loudness.integrated_lufs;
     if (brought && std::abs(*loudness.integrated_lufs - asked.loudness_lufs) > 1)
         fmt::print(
             "the sound is at {:.1f} LUFS, not at {:g}, as its peaks reach {:.1f} dBTP; --gain shifts it all "
             "the same\n",
             *loudness.integrated_lufs, asked.loudness_lufs, loudness.true_peak_dbtp.value_or(0));
-    if (result.clipped_samples > 0)
+    if (result.sound.clipped_samples > 0)
         fmt::print("{} of the sound clipped; less gain avoids it (--gain, or gain_db of the kit)\n",
-                   counted(result.clipped_samples, "sample"));
+                   counted(result.sound.clipped_samples, "sample"));
 }
 
 void print_left_out(const PlayResult& result) {

@@ -7,12 +7,12 @@
 
 #include "commands/command.h"
 #include "commands/commands.h"
+#include "compare/training_report.h"
 #include "files/assets.h"
 #include "files/bad_input.h"
 #include "files/output_file.h"
 #include "process/progress_bar.h"
 #include "sticks/trace_warnings.h"
-#include "training/train.h"
 
 namespace app {
 namespace {

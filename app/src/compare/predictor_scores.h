@@ -117,8 +117,9 @@ private:
 struct StrikePredictors {
     tracking::Predictor& timing;                ///< whose path is swept
     tracking::Predictor* confirming = nullptr;  ///< must confirm near contacts (keep_confirmed); may be none
-    const ContactForecast* network = nullptr;   ///< says, too, when the tip meets a surface; may be none
-    double false_cost = 1;                      ///< of a false sound (StrikeDecision)
+    const ContactForecast* network =
+        nullptr;            ///< a second forecast of contacts (StrikeDecision); may be none
+    double false_cost = 1;  ///< of a false sound; that of a missed strike is 1 (StrikeDecision)
 };
 
 /// A strike is cancelled until this long before its time.
@@ -133,12 +134,12 @@ struct StrikeTiming {
 /// External predictors get these.
 [[nodiscard]] std::vector<double> strike_leads(const StrikeTiming& timing);
 
-/// Strikes of one stick (the strike rules of the README): at each sample the path that the predictor states
-/// until a little beyond the lead is swept against the surface; a contact's time is re-timed at each sample
-/// until the lead before it, then fixed; it may be cancelled, and taken up again, until the release margin
-/// before it (StrikeScheduler, which `play` runs, too). Without cancelling every contact whose time was fixed is
-/// played. The true contacts are those of the recorded path, straight between samples, 3 mm deep. A pure
-/// function, but for `exec:` predictors with a state of their own.
+/// Scores the strikes of one stick. At each sample the predicted path, until a little beyond the lead, is
+/// swept against the surface. Each sample may move a contact in time, until the lead before it; then its time
+/// is fixed. The contact may be cancelled, and taken up again, until kReleaseMarginS before it
+/// (StrikeScheduler, as in `play`). Without cancelling every contact whose time was fixed is played. The true
+/// contacts are those of the recorded path, straight between samples, 3 mm deep. A pure function, except with
+/// `exec:` predictors that keep a state.
 ///
 ///   recorded    the tip's path as recorded, for the truth
 ///   samples     what the sensor reports, in order of arrival

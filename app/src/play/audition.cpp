@@ -12,6 +12,7 @@
 #include "files/bad_input.h"
 #include "play/play_run.h"
 #include "report/plot.h"
+#include "strikes/strike_note.h"
 
 namespace app {
 namespace fs = std::filesystem;

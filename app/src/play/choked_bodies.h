@@ -10,13 +10,15 @@
 
 namespace app {
 
-/// What chokes do to the bodies: whose sound a hand, a foot, a tip or a stroke of its choke group ends, comes to rest.
+/// Chokes bring bodies to rest: the body whose sound is ended by a hand, a foot, a tip or a stroke of its
+/// choke group.
 ///
-/// A choke of an instrument at c, known at s, ends the response to every impulse from before c. Its weight goes from 1 at
-/// max(c, s + render lead) to 0 within 100 ms, with a slope that is 0 at both ends. A frame at T knows what was known at
-/// T - render lead, so it never shows a jump. From then on the body's exact state has no part of it either, and contacts
-/// find the body where pictures show it; an opposite impulse sees to that, since a state is linear in its impulses.
-/// A stroke of the instrument itself ends its older sound, not its motion.
+/// A choke of an instrument at c, known at s, ends the response to every impulse from before c. Its weight
+/// goes from 1 at max(c, s + render lead) to 0 within 100 ms, with a slope that is 0 at both ends. A frame at
+/// T knows what was known at T - render lead, so it never shows a jump. Once the weight is 0 the response is
+/// also taken out of the body's exact state, so that contacts find the body where pictures show it. An
+/// opposite impulse does that, since a state is linear in its impulses. A stroke of the instrument itself
+/// ends its older sound, not its motion.
 ///
 /// One thread. A pure function of the calls.
 class ChokedBodies {

@@ -38,9 +38,10 @@ inline constexpr std::size_t kMostPedalMoves = 1'000'000;
 /// The same of a schedule's text. (Fuzzed.)
 [[nodiscard]] std::vector<PedalMove> parse_pedals(std::string_view text, const std::string& file,
                                                   const Kit& kit);
-/// Removes what cannot be heard between t0_s and t_end_s, and says how much that was; places before t0_s stay.
+/// Removes moves that cannot be heard between t0_s and t_end_s, and returns their number; places before t0_s
+/// stay.
 [[nodiscard]] std::size_t leave_out(std::vector<PedalMove>& moves, double t0_s, double t_end_s);
-/// What a MIDI message, of any channel, does to a kit at its own time:
+/// The moves that a MIDI message, of any channel, stands for, at its own time:
 ///   controller 4 (foot)       every hi-hat: openness 1 - value / 127
 ///   controller 64 (sustain)   every damper: value / 127
 ///   note on                   every beater whose instrument has that note in a zone (35 and 36 count as one): a stroke
@@ -59,24 +60,25 @@ struct PedalNote {
     return note.note.kind == audio::Note::Kind::choke;
 }
 inline constexpr std::uint64_t kFirstPedalId = 1'000'000'000;
-/// Of the notes that only say where a pedal is.
+/// Ids of notes that only carry a pedal's position count from here.
 inline constexpr std::uint64_t kFirstPlaceId = 2'000'000'000;
 
-/// Where the pedals of a kit are, and what they sound.
+/// The positions of a kit's pedals over time, and the notes that they play.
 ///
-/// A hi-hat or damper that comes to 0.1 or below ends what its instrument rings, within 15 ms from that sample on. A
-/// hi-hat sounds then, if it closes fast: its plates have 30 mm to go, and the sound is that of a stroke at their mean speed
-/// since the pedal began to fall, a single step being a fall of 15 ms; below 0.2 m/s there is none. Drum modules say both
-/// where the pedal is and that it closed: within 50 ms that is one sound. A stroke gets the place of the pedal at its onset,
-/// and places() tell the sound where pedals are, for what rings.
+/// A hi-hat or damper that comes to 0.1 or below ends the sound of its instrument, within 15 ms from that
+/// sample on. A hi-hat that closes fast plays a note: its plates have 30 mm to go, and the note is a stroke
+/// at their mean speed since the pedal began to fall; a single step counts as a fall of 15 ms; below 0.2 m/s
+/// there is no note. Drum modules send both the pedal's position and a message that it closed: within 50 ms
+/// both are one note. A stroke gets the pedal's place at its onset; places() carry the pedals' positions to
+/// sounds that go on.
 class Pedals {
 public:
     Pedals() = default;
     /// t0_s: time of sample 0.
     Pedals(const Kit& kit, double t0_s);
 
-    /// Moves of pedals come in order of time. Those before sample 0 only set places. What it sounds is added to notes(); its
-    /// onset is the move's time, or `earliest` where that is later.
+    /// Takes a move; those of pedals come in order of time. Moves before sample 0 only set places. The notes
+    /// that it plays are added to notes(); their onset is the move's time, or `earliest` where that is later.
     void take(const PedalMove& move, std::int64_t earliest = 0);
     /// All pedals go back to rest at that sample, without a sound.
     void rest(std::int64_t sample);
@@ -90,7 +92,7 @@ public:
     [[nodiscard]] const std::vector<audio::Note>& places() const { return places_; }
     /// Controller 4 as the hi-hats moved.
     [[nodiscard]] std::vector<audio::MidiControl> controls() const;
-    /// Taken of pedals and hands.
+    /// The number of moves taken, of pedals and hands.
     [[nodiscard]] std::size_t moves() const { return moves_; }
 
 private:

@@ -71,6 +71,28 @@ struct ContactShape {
     double size_m = 0;  ///< its greatest extent
 };
 
+/// The sound of a run.
+struct RunSound {
+    DiskLog<float> samples;  ///< interleaved stereo, 48 kHz; empty with --no-audio
+    std::size_t clipped_samples = 0;
+    audio::Loudness loudness;  ///< of the samples
+    double gain_db = 0;        ///< that all instruments were given in it
+};
+
+/// What a run's results depend on.
+struct RunOrigin {
+    std::vector<std::pair<std::string, std::string>> inputs;    ///< file, SHA-256
+    std::string fingerprint;                                    ///< of this machine and build
+    std::vector<std::pair<std::string, std::string>> versions;  ///< of the program and its libraries
+};
+
+/// The pictures that a run's report shows.
+struct ReportPictures {
+    std::vector<std::filesystem::path> frames;  ///< a few PNG files on disk
+    std::vector<Film> films;                    ///< strokes that it shows moving; none with a video
+    std::string video;                          ///< the video as the report refers to it; empty: none
+};
+
 /// Everything that `play` found out, for the summary, the tables and the report.
 struct PlayResult {
     PlayOptions options;  ///< as asked for, the predictors as specifications
@@ -87,22 +109,15 @@ struct PlayResult {
     std::vector<TrueContact> contacts;     ///< by time
     StrikeScore score;
     std::vector<TipTrack> tracks;
-    DiskLog<float> audio;             ///< interleaved stereo, 48 kHz; empty with --no-audio
+    RunSound sound;
     std::size_t samples_refused = 0;  ///< reports that the filters ignored
-    std::size_t clipped_samples = 0;
-    audio::Loudness loudness;  ///< of audio
-    double gain_db = 0;        ///< that all instruments were given in it
     double wall_s = 0;
     std::vector<std::pair<std::string, double>> stages_s;  ///< name, seconds
     int workers_lost = 0, bodies_reowned = 0;
-    std::vector<std::pair<std::string, std::string>> inputs;  ///< file, SHA-256
-    std::string fingerprint;
-    std::vector<std::pair<std::string, std::string>> versions;
-    std::vector<ContactShape> contact_shapes;          ///< of instruments with shape = "mesh"
-    std::vector<std::string> failures;                 ///< why plots, the video or the model are missing
-    std::vector<std::filesystem::path> report_frames;  ///< a few PNG files on disk that the report shows
-    std::vector<Film> report_films;                    ///< strokes that it shows moving; none with a video
-    std::string report_video;                          ///< the video as the report refers to it; empty: none
+    RunOrigin origin;
+    std::vector<ContactShape> contact_shapes;  ///< of instruments with shape = "mesh"
+    std::vector<std::string> failures;         ///< why plots, the video or the model are missing
+    ReportPictures pictures;
 };
 
 /// Plays a recorded trace offline on a virtual clock into the folder `out`: frames/, audio.wav, events.csv,

@@ -150,7 +150,7 @@ std::string height_panel(const PlayResult& result, const std::vector<Mark>& mark
 PlotPanel sound_panel(const PlayResult& result, const std::vector<Mark>& marks, const PlotArea& area,
                       double foot, double rise, double width) {
     PlotPanel panel;
-    panel.add(sound_envelope(result.audio, result.t0_s, area.x_low, area.x_high, area.width),
+    panel.add(sound_envelope(result.sound.samples, result.t0_s, area.x_low, area.x_high, area.width),
               "with filledcurves fs solid 1 noborder lc " + gnuplot_colour(colours::wave));
     for (const auto& [kind, colour] :
          {std::pair{Kind::released, colours::released}, {Kind::wrong, colours::wrong}}) {
@@ -164,7 +164,7 @@ PlotPanel sound_panel(const PlayResult& result, const std::vector<Mark>& marks, 
 
 PlotScript row_plot(const PlayResult& result, const std::vector<Mark>& marks, const PlotArea& area,
                     double peak) {
-    const bool sound = !result.audio.empty();
+    const bool sound = !result.sound.samples.empty();
     const int height = kHeightPanel + kFrame + (sound ? kSoundPanel : 0);
     const std::string time_axis = round_tics("x", area.x_high - area.x_low, 8);
     std::string commands = plot_axes() + fmt::format("set xrange [{}:{}]\n", area.x_low, area.x_high) +
@@ -297,7 +297,7 @@ PlotScript overview_plot(const PlayResult& result, const std::vector<Mark>& mark
 }
 
 PlotScript sound_plot(const PlayResult& result, const std::vector<Mark>& marks, double peak) {
-    const std::size_t frames = result.audio.size() / 2;
+    const std::size_t frames = result.sound.samples.size() / 2;
     const double length_s = static_cast<double>(frames) / 48000;
     const PlotArea area = {result.t0_s, result.t0_s + length_s, -1, 1, kWidth, 1};
     const bool few = result.strikes.size() < kWidth;  // more would be one bar
@@ -334,9 +334,10 @@ std::string frequency_tics(const Spectrogram& sound) {
 /// The levels as a picture, and above it the onsets of the notes heard and false.
 PlotScript spectrogram_plot(const PlayResult& result, const std::vector<Mark>& marks, LevelRange& range) {
     constexpr int kRows = 140;
-    const Spectrogram sound = spectrogram({result.audio.data(), result.audio.size()}, kColumns, kRows);
+    const Spectrogram sound =
+        spectrogram({result.sound.samples.data(), result.sound.samples.size()}, kColumns, kRows);
     range = level_range(sound);
-    const double length_s = static_cast<double>(result.audio.size() / 2) / 48000,
+    const double length_s = static_cast<double>(result.sound.samples.size() / 2) / 48000,
                  column_s = length_s / kColumns;
     std::string levels;
     for (int column = 0; column < kColumns; ++column)
@@ -423,7 +424,8 @@ PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result) {
     const std::vector<MatchedNote> notes = matched_notes(result);
     const auto [low, high] = height_range(result);
     double peak = kLeastPeak;
-    for (const float sample : result.audio) peak = std::max(peak, std::abs(static_cast<double>(sample)));
+    for (const float sample : result.sound.samples)
+        peak = std::max(peak, std::abs(static_cast<double>(sample)));
     PlayPlots plots;
     plots.timeline = timeline_of(result);
     const auto framed = [&](PlotScript plot, const char* label) {
@@ -439,7 +441,7 @@ PlayPlots add_play_plots(PlotGallery& gallery, const PlayResult& result) {
     plots.instruments =
         framed(timing_by_instrument_plot(result, notes), "onset minus true contact by instrument");
     plots.leads = framed(lead_plot(result, marks), "first prediction and decision of each note");
-    if (!result.audio.empty()) {
+    if (!result.sound.samples.empty()) {
         plots.sound = framed(sound_plot(result, marks, peak), "envelope of the sound");
         plots.spectrogram = framed(spectrogram_plot(result, marks, plots.levels), "spectrogram of the sound");
     }

@@ -59,9 +59,9 @@ std::string frame_caption(const PlayResult& result, const fs::path& file) {
 }
 
 std::string frames_section(const PlayResult& result, const FrameAtHand& frame_at_hand) {
-    if (result.report_frames.empty()) return {};
+    if (result.pictures.frames.empty()) return {};
     std::string text = "<h2>Frames</h2>\n<div class=frames>\n";
-    for (const fs::path& file : result.report_frames) {
+    for (const fs::path& file : result.pictures.frames) {
         (void)frame_at_hand(frame_number(file));
         const std::string caption = html(frame_caption(result, file));
         fmt::format_to(
@@ -78,11 +78,11 @@ std::string frames_section(const PlayResult& result, const FrameAtHand& frame_at
 /// time, and each frame as soon as it is written: when the last is, little is left to do.
 std::string films_section(const PlayResult& result, const FrameAtHand& frame_at_hand) {
     std::multimap<std::uint64_t, std::size_t> by_time;  // of the films, whose order is that of their loudness
-    for (std::size_t i = 0; i < result.report_films.size(); ++i)
-        by_time.emplace(frame_number(result.report_films[i].files.front()), i);
-    std::vector<std::string> figures(result.report_films.size());
+    for (std::size_t i = 0; i < result.pictures.films.size(); ++i)
+        by_time.emplace(frame_number(result.pictures.films[i].files.front()), i);
+    std::vector<std::string> figures(result.pictures.films.size());
     for (const auto& [start, i] : by_time) {
-        const Film& film = result.report_films[i];
+        const Film& film = result.pictures.films[i];
         const render::Image strip = film_strip(
             film, kFilmWidth, [&](const fs::path& file) { return frame_at_hand(frame_number(file)); });
         if (strip.rgb.empty()) continue;
@@ -108,23 +108,23 @@ std::string films_section(const PlayResult& result, const FrameAtHand& frame_at_
 
 /// What can be seen beside the page.
 std::string video_section(const PlayResult& result) {
-    if (result.report_video.empty()) return {};
+    if (result.pictures.video.empty()) return {};
     return fmt::format(
         "<h2>Video</h2>\n<video controls preload=metadata src=\"{}\"></video>\n"
         "<p class=note>{}, which the page shows while it lies where it was made.</p>\n",
-        html(result.report_video), html(result.options.video->filename().string()));
+        html(result.pictures.video), html(result.options.video->filename().string()));
 }
 
 /// What can be heard: the sound lies within the page while it is short.
 std::string listen_section(const PlayResult& result) {
     std::string text;
-    if (result.audio.empty()) return text;
-    const double length_s = static_cast<double>(result.audio.size() / 2) / audio::kSampleRate;
+    if (result.sound.samples.empty()) return text;
+    const double length_s = static_cast<double>(result.sound.samples.size() / 2) / audio::kSampleRate;
     const bool within = length_s <= kLongestSoundWithinS;
-    const std::string source = within
-                                   ? "data:audio/mpeg;base64," +
-                                         base64(audio::encode_mp3({result.audio.data(), result.audio.size()}))
-                                   : "audio.wav";
+    const std::string source =
+        within ? "data:audio/mpeg;base64," +
+                     base64(audio::encode_mp3({result.sound.samples.data(), result.sound.samples.size()}))
+               : "audio.wav";
     fmt::format_to(std::back_inserter(text),
                    "<h2>Listen</h2>\n<audio controls preload=metadata src=\"{}\"></audio>\n"
                    "<p class=note>{:.1f} s. {}</p>\n",
@@ -251,9 +251,9 @@ std::string pedals_section(const PlayResult& result) {
 /// Inputs and versions.
 std::string provenance(const PlayResult& r) {
     Table inputs = Table::of({"file", "SHA-256"}), versions = Table::of({"part", "version"});
-    for (const auto& [file, sha256] : r.inputs) inputs.add({file, sha256});
-    for (const auto& [name, version] : r.versions) versions.add({name, version});
-    versions.add({"fingerprint of this machine and build", r.fingerprint});
+    for (const auto& [file, sha256] : r.origin.inputs) inputs.add({file, sha256});
+    for (const auto& [name, version] : r.origin.versions) versions.add({name, version});
+    versions.add({"fingerprint of this machine and build", r.origin.fingerprint});
     return "<p class=note>Times and workers, which differ between runs, are in summary.json.</p>\n"
            "<h2>Inputs</h2>\n" +
            inputs.html() + "<h2>Versions</h2>\n" + versions.html();
@@ -272,13 +272,13 @@ std::string timeline_section(const PlayResult& result, const PlayPlots& plots) {
                       "A note stands "
                       "at its onset, at the point where it was predicted to strike.{}</p>\n{}{}\n",
                       plots.timeline.row_s,
-                      result.audio.empty() ? "" : " Under it the sound; vertical lines are onsets.",
+                      result.sound.samples.empty() ? "" : " Under it the sound; vertical lines are onsets.",
                       legend(result), plots.rows);
 }
 
 std::string sound_section(const PlayResult& result, const PlayPlots& plots) {
     float peak = 0;
-    for (const float sample : result.audio) peak = std::max(peak, std::abs(sample));
+    for (const float sample : result.sound.samples) peak = std::max(peak, std::abs(sample));
     const std::string level = peak > 0 ? fmt::format("Peak {:.1f} dBFS", 20 * std::log10(peak)) : "Silence";
     return fmt::format(
         "<h2>Sound</h2>\n<p class=note>The whole file, both channels together: lowest and highest sample "
@@ -286,7 +286,7 @@ std::string sound_section(const PlayResult& result, const PlayPlots& plots) {
         "<h3>Spectrogram</h3>\n<p class=note>Levels over time and frequency, of windows of 43 ms: from {:g} "
         "dB "
         "of full scale and below (dark) to {:g} dB (bright). Ticks above are onsets.</p>\n{}\n",
-        level, result.clipped_samples, plots.sound, plots.levels.low_db, plots.levels.high_db,
+        level, result.sound.clipped_samples, plots.sound, plots.levels.low_db, plots.levels.high_db,
         plots.spectrogram);
 }
 

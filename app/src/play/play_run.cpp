@@ -1,6 +1,5 @@
 #include "play/play_run.h"
 
-#include <audio/samples.h>
 #include <fmt/format.h>
 #include <tracking/input.h>
 
@@ -18,6 +17,7 @@
 #include "report/json_document.h"
 #include "report/table.h"
 #include "sticks/predictors.h"
+#include "strikes/strike_note.h"
 #include "strikes/true_contacts.h"
 
 namespace app {
@@ -25,17 +25,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kLongestHours = 3;
-
-/// 0 at the centre of the struck zone, 1 at its edge: along a string, else by the radius about the body's
-/// axis.
-double place_of(const Strike& strike, const Instrument& instrument) {
-    const Eigen::Vector3d unit = strike.point_body.cwiseQuotient(instrument.body.shape.semi_axes);
-    if (instrument.kind == "string") return std::clamp(std::abs(unit.x()), 0.0, 1.0);
-    const sim::Zone& zone = instrument.body.zones[static_cast<std::size_t>(strike.zone)];
-    const double outer = std::min(1.0, zone.max_radius);
-    const double radius = std::hypot(unit.x(), unit.z());
-    return std::clamp((radius - zone.min_radius) / std::max(1e-6, outer - zone.min_radius), 0.0, 1.0);
-}
 
 constexpr double kApartS = 0.5;  // between the notes whose frames the report shows
 
@@ -104,10 +93,10 @@ std::vector<Film> films_to_show(const PlayResult& result, const fs::path& folder
 /// What the report shows of the frames, some of which may still be drawn.
 void choose_frames(PlayResult& result, FrameThread& frames, const fs::path& folder) {
     if (result.frames == 0) result.frames = frames.pushed();
-    result.report_frames = frames_to_show(result, folder);
-    if (!result.options.video) result.report_films = films_to_show(result, folder);
+    result.pictures.frames = frames_to_show(result, folder);
+    if (!result.options.video) result.pictures.films = films_to_show(result, folder);
     std::vector<std::uint64_t> shown;
-    for (const Film& film : result.report_films)
+    for (const Film& film : result.pictures.films)
         for (const fs::path& file : film.files) shown.push_back(frame_number(file));
     frames.keep_pictures(shown);
 }
@@ -118,7 +107,7 @@ void take_frames(PlayResult& result, FrameThread& frames) {
     result.stages_s.emplace_back("drawing (own thread)", frames.report().draw_s);
     result.stages_s.emplace_back("writing frames (own thread)", frames.report().write_s);
     result.stages_s.emplace_back("frames (waiting at the end)", waited_s);
-    result.versions.emplace_back("renderer", frames.report().version);
+    result.origin.versions.emplace_back("renderer", frames.report().version);
 }
 
 /// A file as a page in a folder refers to it: a relative address (RFC 3986).
@@ -137,7 +126,7 @@ std::string link_to(const fs::path& file, const fs::path& folder) {
 
 /// After the last frame the sound rings out: how many frames more until it has ended.
 std::size_t frames_after_last(const PlayResult& result) {
-    const double sound_s = static_cast<double>(result.audio.size()) / (2 * audio::kSampleRate);
+    const double sound_s = static_cast<double>(result.sound.samples.size()) / (2 * audio::kSampleRate);
     const double more = std::ceil(sound_s * result.options.fps - 1e-6) - static_cast<double>(result.frames);
     return static_cast<std::size_t>(std::max(0.0, more));
 }
@@ -179,19 +168,6 @@ std::vector<audio::Voice> voices_of(const Kit& kit) {
     std::vector<audio::Voice> voices;
     for (const Instrument& instrument : kit.instruments) voices.push_back(instrument.voice);
     return voices;
-}
-
-audio::Note note_of(const Strike& strike, const Instrument& instrument) {
-    audio::Note note;
-    note.id = strike.id;
-    note.voice = strike.instrument;
-    note.onset_sample = strike.onset_sample;
-    note.speed_mps = 5 * std::pow(strike.speed_mps / 5, instrument.velocity_gamma);
-    note.place = place_of(strike, instrument);
-    note.zone = strike.zone;
-    note.midi_note = instrument.zones[static_cast<std::size_t>(strike.zone)].midi_note;
-    note.midi_velocity = audio::stroke_velocity(note.speed_mps);
-    return note;
 }
 
 std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit) {
@@ -257,14 +233,17 @@ PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const 
             result.contact_shapes.push_back(
                 {instrument.name, *instrument.fitted, 2 * instrument.body.shape.semi_axes.maxCoeff()});
     }
-    if (!trace.sha256.empty()) result.inputs.emplace_back(options.trace.string(), trace.sha256);
-    if (options.pedals) result.inputs.emplace_back(options.pedals->string(), sha256_of_file(*options.pedals));
+    if (!trace.sha256.empty()) result.origin.inputs.emplace_back(options.trace.string(), trace.sha256);
+    if (options.pedals)
+        result.origin.inputs.emplace_back(options.pedals->string(), sha256_of_file(*options.pedals));
     for (const auto* files : {&kit.files, &kit.sound_files})
-        for (const fs::path& file : *files) result.inputs.emplace_back(file.string(), sha256_of_file(file));
+        for (const fs::path& file : *files)
+            result.origin.inputs.emplace_back(file.string(), sha256_of_file(file));
     std::set<fs::path> models;
     for (const std::string& each : {result.options.picture_predictor, result.options.sound_predictor})
         if (const std::optional<fs::path> model = model_file(each)) models.insert(*model);
-    for (const fs::path& model : models) result.inputs.emplace_back(model.string(), sha256_of_file(model));
+    for (const fs::path& model : models)
+        result.origin.inputs.emplace_back(model.string(), sha256_of_file(model));
     return result;
 }
 
@@ -286,12 +265,12 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
     folder.adorn(
         "", [&] { stage("report", [&] { sections = report_sections(result, plotter, frame_at_hand); }); });
     if (parts.frames) take_frames(result, *parts.frames);
-    result.fingerprint =
+    result.origin.fingerprint =
         fingerprint(parts.frames ? parts.frames->report().rest_image.rgb : std::vector<std::uint8_t>{});
     const sim::WorkerReport workers = parts.simulation.report();
     result.workers_lost = workers.lost;
     result.bodies_reowned = workers.bodies_reowned;
-    result.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
+    result.origin.versions.emplace_back("musicworld", MUSICWORLD_VERSION);
     std::unique_ptr<OutputFile> video;
     if (options.video)
         folder.adorn("", [&] {
@@ -300,7 +279,7 @@ void write_products(PlayResult& result, const RunParts& parts, OutputFolder& fol
                                    folder.path("."));
             });
         });
-    if (video) result.report_video = link_to(*options.video, options.out);
+    if (video) result.pictures.video = link_to(*options.video, options.out);
     const std::string realtime_json = realtime_part ? realtime_part() : std::string();
     write_file(folder.path("events.csv"), format_events(result));
     write_file(folder.path("contacts.csv"), format_contacts(result));
@@ -326,7 +305,7 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
     const double duration_s = r.t_end_s - r.t0_s;
     const bool any_matched = s.released > s.false_notes;
     Json inputs = Json::array();
-    for (const auto& [file, sha256] : r.inputs) inputs.push_back({{"file", file}, {"sha256", sha256}});
+    for (const auto& [file, sha256] : r.origin.inputs) inputs.push_back({{"file", file}, {"sha256", sha256}});
     Json summary = {
         {"trace", r.trace},
         {"kit", o.kit.string()},
@@ -353,8 +332,8 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
         {"stages_s", object_json(r.stages_s)},
         {"workers", {{"count", o.workers}, {"lost", r.workers_lost}, {"bodies_reowned", r.bodies_reowned}}},
         {"inputs", inputs},
-        {"fingerprint", r.fingerprint},
-        {"versions", object_json(r.versions)},
+        {"fingerprint", r.origin.fingerprint},
+        {"versions", object_json(r.origin.versions)},
         {"kit_name", r.kit_name},
         {"trace_source", r.trace_source},
         {"t0_s", r.t0_s},
@@ -364,7 +343,7 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
         {"cancelling", o.cancelling},
         {"sticks", r.sticks},
         {"samples_refused", r.samples_refused},
-        {"clipped_samples", r.clipped_samples},
+        {"clipped_samples", r.sound.clipped_samples},
         {"speed_error",
          {{"median_percent", or_null(s.speed_median_percent)},
           {"p95_percent", or_null(s.speed_p95_percent)},
@@ -373,10 +352,10 @@ std::string format_summary(const PlayResult& r, const std::string& realtime_json
         {"place_error_mm", {{"median", or_null(s.place_median_mm)}, {"p95", or_null(s.place_p95_mm)}}},
         {"false_cost", o.false_cost},
         {"loudness",
-         {{"integrated_lufs", or_null(r.loudness.integrated_lufs)},
-          {"range_lu", or_null(r.loudness.range_lu)},
-          {"true_peak_dbtp", or_null(r.loudness.true_peak_dbtp)},
-          {"gain_db", r.gain_db}}},
+         {{"integrated_lufs", or_null(r.sound.loudness.integrated_lufs)},
+          {"range_lu", or_null(r.sound.loudness.range_lu)},
+          {"true_peak_dbtp", or_null(r.sound.loudness.true_peak_dbtp)},
+          {"gain_db", r.sound.gain_db}}},
         {"wall_s", r.wall_s},
     };
     if (r.pedals.moves() + r.pedal_moves_left_out > 0 || !r.pedals.notes().empty()) {

@@ -40,9 +40,6 @@ void require_tools(const PlayOptions& options);
 [[nodiscard]] PlayResult describe(const PlayOptions& options, const PlayedTrace& trace, const Kit& kit);
 
 [[nodiscard]] std::vector<audio::Voice> voices_of(const Kit& kit);
-/// The note that sounds a strike: speed through the instrument's velocity curve, place within the struck
-/// zone, MIDI note and velocity. MIDI velocity = 127 (v / 8 m/s)^0.7, held to 1..127.
-[[nodiscard]] audio::Note note_of(const Strike& strike, const Instrument& instrument);
 /// All notes that a run sounded, those of pedals included, by onset.
 [[nodiscard]] std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit);
 [[nodiscard]] std::filesystem::path orchestra_file();
@@ -67,17 +64,17 @@ struct RunParts {
 
 /// The kit's mix with the gain that was asked for.
 [[nodiscard]] audio::Mix mix_of(const PlayOptions& options, const Kit& kit);
-/// Measures result.audio, which was mixed with `mix`; with `may_change` brings it to the loudness that was
-/// asked for, unless a gain was, by one gain for all of it. In play_sound.cpp, as the next.
-void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change);
-/// Puts the sound of the note of --solo in place of that of all, which `mix` and the result's gain made: what it is of it,
-/// choked by the others, and as long.
+/// Measures a sound that was mixed with `mix`. With `may_change` one gain brings it to the loudness that was
+/// asked for, unless a gain was. In play_sound.cpp, as the next.
+void set_loudness(RunSound& sound, const MixOptions& asked, const audio::Mix& mix, bool may_change);
+/// Replaces the sound, which was made with `mix`, by that of the note of --solo alone: as it is in the mix,
+/// choked by the others, with the same gain and length.
 void keep_solo(PlayResult& result, const Kit& kit, const audio::Mix& mix);
-/// Writes stems/NN_NAME.wav, as long as result.audio, for each instrument that was sounded: they add up to it
-/// without its room. With bus_stems stems/NN_bus_NAME.wav likewise for each bus.
+/// Writes stems/NN_NAME.wav, as long as the sound of all, for each instrument that was sounded: they add up
+/// to it without its room. With bus_stems stems/NN_bus_NAME.wav likewise for each bus.
 void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder);
 
-/// Ends the sound of a run that lasted `seconds`: result.audio, audio.wav, version and time of the thread.
+/// Ends the sound of a run that lasted `seconds`: result.sound, audio.wav, version and time of the thread.
 /// Sound: audio::Performance or audio::LivePerformance.
 template <class Sound>
 void finish_sound(Sound& sound, double seconds, PlayResult& result, const Kit& kit,
@@ -86,15 +83,16 @@ void finish_sound(Sound& sound, double seconds, PlayResult& result, const Kit& k
     const auto tail = static_cast<std::int64_t>(kLongestSoundTailS * audio::kSampleRate);
     constexpr bool is_live = std::is_same_v<Sound, audio::LivePerformance>;
     if constexpr (is_live)
-        result.audio.cut(2 * static_cast<std::size_t>(sound.finish(length, tail)));  // which has taken it
+        result.sound.samples.cut(2 *
+                                 static_cast<std::size_t>(sound.finish(length, tail)));  // which has taken it
     else
-        result.audio.append(sound.finish(length, tail));
+        result.sound.samples.append(sound.finish(length, tail));
     const audio::Mix mix = mix_of(result.options, kit);
-    set_loudness(result, mix, !is_live);
+    set_loudness(result.sound, result.options.mix, mix, !is_live);
     if (result.options.solo) keep_solo(result, kit, mix);
-    result.clipped_samples = audio::write_wav(folder.path("audio.wav"), result.audio);
+    result.sound.clipped_samples = audio::write_wav(folder.path("audio.wav"), result.sound.samples);
     result.stages_s.emplace_back("sound (own thread)", sound.busy_s());
-    result.versions.emplace_back("csound", sound.version());
+    result.origin.versions.emplace_back("csound", sound.version());
 }
 
 /// From a run whose strikes, tracks and sound are in `result` to a finished folder: scores the strikes

@@ -24,7 +24,7 @@ std::string file_name(std::size_t number, std::string name) {
 std::vector<float> mixed(const PlayResult& result, const Kit& kit, const audio::Mix& mix) {
     audio::Performance performance(orchestra_file(), voices_of(kit), mix);
     for (const audio::Note& note : notes_of(result, kit)) performance.schedule(note);
-    return performance.finish(static_cast<std::int64_t>(result.audio.size() / 2), 0);
+    return performance.finish(static_cast<std::int64_t>(result.sound.samples.size() / 2), 0);
 }
 
 }  // namespace
@@ -35,26 +35,27 @@ audio::Mix mix_of(const PlayOptions& options, const Kit& kit) {
     return mix;
 }
 
-void set_loudness(PlayResult& result, const audio::Mix& mix, bool may_change) {
-    const MixOptions& asked = result.options.mix;
-    result.gain_db = mix.gain_db;
-    result.loudness = audio::measure_loudness({result.audio.data(), result.audio.size()});
+void set_loudness(RunSound& sound, const MixOptions& asked, const audio::Mix& mix, bool may_change) {
+    sound.gain_db = mix.gain_db;
+    sound.loudness = audio::measure_loudness({sound.samples.data(), sound.samples.size()});
     if (!may_change || asked.gain_db) return;
-    const double gain_db = audio::gain_towards(result.loudness, asked.loudness_lufs, kHighestPeakDbtp);
+    const double gain_db = audio::gain_towards(sound.loudness, asked.loudness_lufs, kHighestPeakDbtp);
     const auto gain = static_cast<float>(std::pow(10.0, gain_db / 20));
-    for (float& sample : result.audio) sample *= gain;
-    result.gain_db += gain_db;
-    for (std::optional<double>* level : {&result.loudness.integrated_lufs, &result.loudness.true_peak_dbtp})
+    for (float& sample : sound.samples) sample *= gain;
+    sound.gain_db += gain_db;
+    for (std::optional<double>* level : {&sound.loudness.integrated_lufs, &sound.loudness.true_peak_dbtp})
         if (*level) **level += gain_db;  // both are levels: what shifts the sound shifts them
 }
 
 void keep_solo(PlayResult& result, const Kit& kit, const audio::Mix& mix) {
     audio::Mix alone = mix;
     alone.alone_note = result.options.solo;
-    const auto gain = static_cast<float>(std::pow(10.0, (result.gain_db - mix.gain_db) / 20));
+    const auto gain = static_cast<float>(std::pow(10.0, (result.sound.gain_db - mix.gain_db) / 20));
     const std::vector<float> sound = mixed(result, kit, alone);
-    std::ranges::transform(sound, result.audio.begin(), [gain](float sample) { return sample * gain; });
-    result.loudness = audio::measure_loudness({result.audio.data(), result.audio.size()});
+    std::ranges::transform(sound, result.sound.samples.begin(),
+                           [gain](float sample) { return sample * gain; });
+    result.sound.loudness =
+        audio::measure_loudness({result.sound.samples.data(), result.sound.samples.size()});
 }
 
 void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& folder) {
@@ -67,7 +68,7 @@ void write_stems(const PlayResult& result, const Kit& kit, const OutputFolder& f
         };
         if (std::ranges::none_of(notes, sounds)) return;
         audio::Mix mix;
-        mix.gain_db = result.gain_db;
+        mix.gain_db = result.sound.gain_db;
         mix.alone = instruments;
         (void)audio::write_wav(folder.path("stems/" + name), mixed(result, kit, mix));
     };

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <iterator>
 
-#include "play/play_run.h"
 #include "sticks/predictors.h"
+#include "strikes/strike_note.h"
 
 namespace app {
 namespace {
@@ -95,25 +95,23 @@ std::vector<sim::WeightedImpulse> DrawnStrikes::frame(double T, std::span<const 
     return result;
 }
 
-StrikePipeline::StrikePipeline(const Kit& kit, const PlayOptions& options, double t0_s, double tip_radius_m,
+StrikePipeline::StrikePipeline(const Kit& kit, const PipelineSettings& settings,
                                const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify,
                                const std::shared_ptr<const tracking::PathModel>& contacts)
     : kit_(kit),
-      cancelling_(options.cancelling),
-      release_margin_s_(options.release_margin_s),
-      tip_radius_m_(tip_radius_m),
+      settings_(settings),
       sticks_(sticks),
       simulation_(simulation),
       notify_(std::move(notify)),
-      scheduler_({.t0_s = t0_s,
-                  .release_margin_s = options.release_margin_s,
-                  .commit_lead_s = options.release_margin_s,
-                  .cancelling = options.cancelling},
+      scheduler_({.t0_s = settings.t0_s,
+                  .release_margin_s = settings.release_margin_s,
+                  .commit_lead_s = settings.release_margin_s,
+                  .cancelling = settings.cancelling},
                  sticks_.size(), kit.instruments.size()),
       rests_(tip_holds(kit), sticks_.size()),
       decisions_(sticks_.size() * tracking::StickState::kMostModels,
-                 StrikeDecision(kit.instruments.size(), options.false_cost, options.release_margin_s)),
-      choked_(kit, t0_s, options.render_lead_s) {
+                 StrikeDecision(kit.instruments.size(), settings.false_cost, settings.release_margin_s)),
+      choked_(kit, settings.t0_s, settings.render_lead_s) {
     if (!contacts) return;
     network_.emplace(contacts);
     for (const Stick& stick : sticks_) motions_.emplace_back(*contacts, stick.geometry().shaft);
@@ -170,7 +168,7 @@ std::vector<StrikePipeline::StickPaths> StrikePipeline::add_paths(std::span<cons
 ContactForecast::Forecast StrikePipeline::forecast(const Stick& stick) const {
     const ContactForecast::Surfaces surfaces{
         kit_.instruments.size(), [this](std::size_t instrument, const Eigen::Vector3d& tip) {
-            return sim::rest_distance(kit_.instruments[instrument].body, tip, tip_radius_m_);
+            return sim::rest_distance(kit_.instruments[instrument].body, tip, settings_.tip_radius_m);
         }};
     tracking::TipView view;
     if (!stick.look(view)) return {};
@@ -236,7 +234,8 @@ std::vector<double> StrikePipeline::measured_clearance(const StickPaths& paths,
     for (std::size_t b = 0; b < bodies; ++b) {
         // The nearer of the surface as it vibrates and at rest: a vibrating head does not arm a stick that lies
         // on it.
-        const double rest = sim::rest_distance(kit_.instruments[b].body, tip, tip_radius_m_).distance;
+        const double rest =
+            sim::rest_distance(kit_.instruments[b].body, tip, settings_.tip_radius_m).distance;
         measured[b] = std::min(rest, reply.clearance_m[paths.measured * bodies + b]);
     }
     return measured;
@@ -264,11 +263,11 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
         const std::size_t path = paths.predicted + model;
         expected.filtered_m = std::span(reply.clearance_m).subspan(path * bodies, bodies);
         expected.path = expected.confirmed = contacts_of(path);
-        if (paths.confirming && cancelling_)
+        if (paths.confirming && settings_.cancelling)
             keep_confirmed(expected.confirmed, contacts_of(*paths.confirming), s);
         DecidedStrikes decided =
             decisions_[paths.stick * tracking::StickState::kMostModels + model].after(expected);
-        contacts.push_back(std::move(cancelling_ ? decided.sounding : decided.kept));
+        contacts.push_back(std::move(settings_.cancelling ? decided.sounding : decided.kept));
         silent_until_s.push_back(std::move(decided.silent_until_s));
         views.push_back({{}, expected.filtered_m});
     }
@@ -282,7 +281,8 @@ void StrikePipeline::take_contacts(double s, const StickPaths& paths, const sim:
 
 std::vector<TipRest> StrikePipeline::take_tip_rests() {
     std::vector<TipRest> rests = rests_.take();
-    for (const TipRest& rest : rests) choked_.end(rest.instrument, rest.s + release_margin_s_, rest.s);
+    for (const TipRest& rest : rests)
+        choked_.end(rest.instrument, rest.s + settings_.release_margin_s, rest.s);
     return rests;
 }
 
@@ -325,7 +325,7 @@ DrawnStick StrikePipeline::drawn(std::uint32_t stick, double s, double T, bool s
     result.tip = tracking::point_of(result.pose, known.geometry().tip);
     if (const Strike* strike = struck_by(stick, s, T)) {
         if (shows) touching_.insert(strike->id);
-        const Eigen::Vector3d touch = strike->point_world + tip_radius_m_ * strike->normal_world;
+        const Eigen::Vector3d touch = strike->point_world + settings_.tip_radius_m * strike->normal_world;
         if (strike->contact_s > s) result.tip = known.sounding_tip_at(T);
         result.pose = known.pose_at(std::max(s, strike->contact_s));
         result.pose.position += touch - tracking::point_of(result.pose, known.geometry().tip).position;

@@ -13,7 +13,6 @@
 
 #include "kit/kit.h"
 #include "play/choked_bodies.h"
-#include "play/play.h"
 #include "process/clock.h"
 #include "sticks/stick.h"
 #include "strikes/contact_forecast.h"
@@ -24,18 +23,18 @@
 
 namespace app {
 
-/// The strikes as pictures show them. A contact is drawn, with the impulse known then, by the first frame
-/// that is shown after it; if it is cancelled later its response fades within 100 ms, and if it moves before
-/// its release the response passes over to the final one in the same time: never a jump. What is choked weighs what
-/// ChokedBodies says. Frames must come in order. One thread.
+/// The response of the bodies to strikes, as pictures show it. The first frame after a contact draws it, with
+/// the impulse known then. If the strike is cancelled later, its response fades within 100 ms. If it moves
+/// before its release, the response passes over to the final one in the same time. So there is never a jump.
+/// Choked impulses are weighted by ChokedBodies. Frames must come in order. One thread.
 class DrawnStrikes {
 public:
     /// A released strike's impulse has become part of the bodies' exact states.
     void folded(std::uint64_t id) { mark(id).folded = true; }
-    /// It was taken out of them again, choked.
+    /// Its impulse was choked and taken out of these states again.
     void stopped(std::uint64_t id) { mark(id).stopped = true; }
-    /// What the frame shown at T adds to the exact states, given the strikes as known from the samples that
-    /// this frame may use.
+    /// The impulses that the frame shown at T adds to the exact states. `strikes`: as known from the samples
+    /// that this frame may use.
     [[nodiscard]] std::vector<sim::WeightedImpulse> frame(double T, std::span<const Strike> strikes,
                                                           const ChokedBodies& choked);
 
@@ -95,20 +94,28 @@ struct FrameContents {
     }
 };
 
-/// From what is known of the sticks to strikes, notes and pictures, on the clock of the caller:
-/// contacts of predicted paths (sim), their life as strikes (StrikeScheduler), the bodies' response, and what
-/// a frame shows of both. Begins with all bodies at rest. Offline and in real time the same.
+struct PipelineSettings {
+    double t0_s;          ///< time of audio sample 0
+    double tip_radius_m;  ///< of the sticks
+    double render_lead_s;
+    double release_margin_s;  ///< a note is fixed this long before its onset
+    double false_cost;        ///< of a false sound; that of a missed strike is 1 (StrikeDecision)
+    bool cancelling;          ///< false: every note that was scheduled is played
+};
+
+/// Turns predicted stick motion into strikes, notes and pictures, on the clock of the caller: contacts of
+/// predicted paths (sim), their life as strikes (StrikeScheduler), the bodies' response, and the contents of
+/// frames. Begins with all bodies at rest. The same offline and in real time.
 class StrikePipeline {
 public:
-    /// A note's change, for the sound: the note as it stands, its id that of the strike; `scheduled` false:
-    /// cancelled.
+    /// Gets a note that was scheduled or changed, or, with `scheduled` false, cancelled. Its id is that of
+    /// the strike.
     using Notify = std::function<void(const audio::Note& note, bool scheduled)>;
 
-    /// The strikes follow the margin and the cancelling of the options; t0_s is audio sample 0. `simulation`
-    /// begins anew with the first step; `sticks` are kept up to date by the caller. `contacts`: a model whose
-    /// network of contacts is heard (contact_model()); may be none.
-    StrikePipeline(const Kit& kit, const PlayOptions& options, double t0_s, double tip_radius_m,
-                   const std::vector<Stick>& sticks, sim::Simulation& simulation, Notify notify,
+    /// `simulation` begins anew with the first step. The caller keeps `sticks` up to date. `contacts`: a
+    /// model whose network of contacts takes part in decisions (contact_model()); null: none.
+    StrikePipeline(const Kit& kit, const PipelineSettings& settings, const std::vector<Stick>& sticks,
+                   sim::Simulation& simulation, Notify notify,
                    const std::shared_ptr<const tracking::PathModel>& contacts = {});
 
     /// Before the samples at s (StrikeScheduler::advance_to).
@@ -117,19 +124,20 @@ public:
     void restart(std::uint32_t stick);
     /// New samples of these sticks at s: contacts, strikes, notes.
     void take(double s, std::span<const std::uint32_t> moved);
-    /// Tips that choke what they lie on, found since the last call, in order; what rings ends a release margin
-    /// after the sample.
+    /// The tips that choke an instrument, found since the last call, in order. The sound ends a release
+    /// margin after the sample.
     [[nodiscard]] std::vector<TipRest> take_tip_rests();
-    /// What pedals and hands sound, known at s: what it chokes comes to rest.
+    /// Takes a note of a pedal or a hand, known at s: the bodies that it chokes come to rest.
     void choke(const audio::Note& note, double s = -std::numeric_limits<double>::infinity()) {
         choked_.take(note, s);
     }
     /// After the last sample.
     void finish();
-    /// What the frame shown at T >= s shows, known at s. Frames come in order of T.
+    /// The contents of the frame shown at T >= s, as known at s. Frames come in order of T.
     [[nodiscard]] FrameContents scene(double s, double T);
-    /// What a frame shows at some moments, in order, of which the last is when it is shown; it is as scene() has it. At
-    /// a moment before s a body is as at s and a stick as in its newest sample.
+    /// The contents of a frame at several moments, in order, for motion blur. The last moment is when the
+    /// frame is shown, with the contents of scene(). At a moment before s bodies are as at s, and sticks as
+    /// in their newest samples.
     [[nodiscard]] std::vector<FrameContents> scenes(double s, std::span<const double> moments);
 
     [[nodiscard]] const std::vector<Strike>& strikes() const { return scheduler_.strikes(); }
@@ -139,23 +147,22 @@ public:
 
 private:
     [[nodiscard]] sim::StepReply step(sim::StepRequest& request);
-    /// Where the paths of a stick stand in a request; each path's `stick` is its own place there, so that its
-    /// contacts can be assigned to it.
+    /// Indices of a stick's paths in a request. sim::TipPath::stick holds the path's own index, so that
+    /// contacts can be assigned to paths.
     struct StickPaths {
         std::uint32_t stick = 0;
-        std::size_t predicted = 0;            ///< the first of the models' paths, which follow each other
-        std::size_t measured = 0;             ///< stands still: makes no contact but by starting inside
+        std::size_t predicted = 0;            ///< of the models' paths the first; the others follow
+        std::size_t measured = 0;             ///< stands still: makes a contact only if it starts inside
         std::optional<std::size_t> way = {};  ///< of the measured tip since the sample before
-        std::optional<std::size_t> confirming = {};  ///< where a second filter confirms
-        std::optional<std::size_t> network = {};     ///< what a network of contacts expects, if anything
-        std::vector<std::optional<tracking::ContactTimes>> times =
-            {};  ///< and when (ContactForecast::Forecast)
+        std::optional<std::size_t> confirming = {};  ///< of the confirming filter, if there is one
+        std::optional<std::size_t> network = {};     ///< predicted by a network of contacts, if there is one
+        std::vector<std::optional<tracking::ContactTimes>> times = {};  ///< ContactForecast::Forecast::times
     };
     [[nodiscard]] std::vector<StickPaths> add_paths(std::span<const std::uint32_t> moved,
                                                     std::vector<sim::TipPath>& paths) const;
-    /// What the network of contacts expects of a stick.
+    /// The forecast of the network of contacts for a stick.
     [[nodiscard]] ContactForecast::Forecast forecast(const Stick& stick) const;
-    /// Compares the sticks with those that the network was learned from.
+    /// Follows whether the sticks move as those that the network was trained on (tracking::KnownMotion).
     void follow_motion(std::span<const std::uint32_t> moved);
     void take_contacts(double s, const StickPaths& paths, const sim::StepReply& reply);
     [[nodiscard]] std::vector<double> measured_clearance(const StickPaths& paths,
@@ -168,8 +175,7 @@ private:
     [[nodiscard]] DrawnStick drawn(std::uint32_t stick, double s, double T, bool shows);
 
     const Kit& kit_;
-    bool cancelling_;
-    double release_margin_s_, tip_radius_m_;
+    PipelineSettings settings_;
     const std::vector<Stick>& sticks_;
     sim::Simulation& simulation_;
     Notify notify_;
@@ -181,7 +187,7 @@ private:
     ChokedBodies choked_;
     DrawnStrikes drawn_;
     std::vector<std::uint64_t> unfolded_;  // released strikes whose impulses lie ahead
-    std::set<std::uint64_t> touching_;     // recent strikes that a frame has shown the stick at
+    std::set<std::uint64_t> touching_;     // recent strikes at which a frame has drawn the stick
     bool begun_ = false;
     double simulated_s_ = 0;
     LoopTimes times_;

@@ -329,8 +329,8 @@ RealtimeOutcome play_realtime(const RealtimeOptions& options, const Warn& warn) 
         learned.emplace(LearnedInPlay{*file, "play --realtime", outcome.play.options.picture_predictor,
                                       session.live ? session.options.sensors.source : outcome.play.trace});
     folder.emplace(options.play.out);
-    outcome.play.audio = DiskLog<float>(folder->scratch());
-    session.start(*folder, outcome.play.audio, warn);
+    outcome.play.sound.samples = DiskLog<float>(folder->scratch());
+    session.start(*folder, outcome.play.sound.samples, warn);
     if (!session.live) warn_of_units(session.trace);  // now that nothing is left to be refused
     outcome.play.stages_s.emplace_back("start", wall.seconds());
     {

@@ -9,7 +9,7 @@
 
 namespace app {
 
-/// Where the model goes that sticks have taught, and what its provenance says of the run.
+/// The file that gets the model which sticks have trained in a run, and what its provenance says of the run.
 struct LearnedInPlay {
     std::filesystem::path file;
     std::string command;    ///< `play` or `predict`
@@ -17,18 +17,20 @@ struct LearnedInPlay {
     std::string input;      ///< a trace's file, or a live source
 };
 
-/// --save-model: the model that a predictor begins with, its last layer as the sticks teach it, and where it comes from:
-/// the run, the model that it began with and that one's own lines, each key behind `base_`.
+/// --save-model: saves the model of a predictor with the last layer that it learned from the sticks. Its
+/// provenance names the run, the model that the run began with, and the provenance of that model, each key
+/// with the prefix `base_`.
 class LearnedModel {
 public:
-    /// Before anything is played. Throws BadInput for a predictor that learns nothing which could be saved, for a file
-    /// that cannot be made, and for names that a model's head cannot hold.
+    /// To be made before the run begins. Throws BadInput for a predictor that does not learn, for a file that
+    /// cannot be made, and for names that a model's head cannot hold.
     explicit LearnedModel(LearnedInPlay run);
-    /// Throws std::runtime_error when the model that the run began with is another by now, and when the file cannot be
-    /// written.
+    /// Throws std::runtime_error when the file of the model that the run began with has changed since, and
+    /// when the file cannot be written.
     void save(std::span<const tracking::Experience> experiences) const;
-    /// For the end of a run, whose products stay whatever becomes of the model: save(), unless no stick has said what
-    /// it learned. Why not all is saved, of the sticks `silent`, too, goes into `failures`.
+    /// save() for the end of a run: a failure does not throw but is added to `failures`. Nothing is saved
+    /// without experiences. `silent`: the names of sticks whose experience is missing; they are added to
+    /// `failures`, too.
     void save_or_say(std::span<const tracking::Experience> experiences,
                      const std::vector<std::string>& silent, std::vector<std::string>& failures) const;
 
@@ -39,7 +41,7 @@ private:
     tracking::Provenance provenance_;
 };
 
-/// Between processes of one program. Throws std::runtime_error for bytes that are not of it.
+/// To pass experiences between processes of one program. Throws std::runtime_error for other bytes.
 [[nodiscard]] std::string bytes_of(std::span<const tracking::Experience> experiences);
 [[nodiscard]] std::vector<tracking::Experience> experiences_of(std::string_view bytes);
 

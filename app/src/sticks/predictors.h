@@ -11,19 +11,19 @@
 
 namespace app {
 
-/// What a predictor may know of the stick that it follows.
+/// The stick that a predictor follows.
 struct TrackedStick {
     std::string name = "-";                             ///< external predictors get it
     Eigen::Vector3d shaft = -Eigen::Vector3d::UnitZ();  ///< unit, hand to tip, in the body's frame
 };
 
-/// What makes predictors of any kind that the command line may name: those of tracking::make_predictor and
-/// `exec:CMD`, a child process (ExternalPredictor). A network's `model=FILE` may be a bundled one's name, which it is
-/// by default; the file is read once, here.
+/// Makes predictors of any kind that the command line may name: those of tracking::make_predictor and
+/// `exec:CMD`, a child process (ExternalPredictor). A network's `model=FILE` may be the name of a bundled
+/// model, as the default is. The constructor reads the file, once.
 class PredictorMaker {
 public:
-    /// `auto` must have been resolved before. `model`: what a network runs in place of its file. Throws BadInput with
-    /// one line, tracking::TraceError for a file that is no model.
+    /// `auto` must have been resolved before. `model`: used in place of the file of `model=FILE`. Throws
+    /// BadInput with one line, tracking::TraceError for a file that is no model.
     explicit PredictorMaker(const std::string& specification,
                             std::shared_ptr<const tracking::PathModel> model = {});
     /// `leads_s` are the leads that will be asked for: an external predictor computes these, in between its answers
@@ -43,12 +43,14 @@ private:
 
 /// `auto`, or `auto:model=FILE`.
 [[nodiscard]] bool is_auto(const std::string& specification);
-/// A predictor's specification with `auto` resolved: what measurements chose for pictures and for sound.
+/// A predictor's specification with `auto` resolved: the predictor that did best in measurements, for
+/// pictures and for sound.
 [[nodiscard]] std::string picture_specification(const std::string& specification);
 [[nodiscard]] std::string sound_specification(const std::string& specification);
 /// The file of the network that a resolved specification names; none without one. Throws BadInput.
 [[nodiscard]] std::optional<std::filesystem::path> model_file(const std::string& specification);
-/// The model of `auto` if it has a network of contacts, which is heard about strikes (ContactForecast); else none.
+/// The model of `auto` if it has a network of contacts, which then takes part in the decision about strikes
+/// (ContactForecast); else null.
 [[nodiscard]] std::shared_ptr<const tracking::PathModel> contact_model(
     const std::string& sound_specification);
 /// The filter that confirms the strikes of a sound predictor's specification; empty for none. With `auto`,
@@ -58,7 +60,7 @@ private:
 /// Throws what make_any_predictor would, `auto` being allowed; starts no child.
 void check_specification(const std::string& specification);
 
-/// True for `exec:CMD`: its time includes a process and two messages, and is marked as external.
+/// True for `exec:CMD`. Its times include a process and two messages, so tables mark them as external.
 [[nodiscard]] bool is_external(const std::string& specification);
 
 /// Splits a comma-separated list of specifications: a part with `=` but no `:` belongs to the one before, unless that

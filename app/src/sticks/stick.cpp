@@ -149,7 +149,7 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     const tracking::SampleStatus status = sound_.predictor->correct(sample);
     picture_.predictor->require_working();
     sound_.predictor->require_working();
-    say_paths(state);  // a sample that one filter refuses may count for another
+    write_paths(state);  // a sample that one filter refuses may count for another
     if (!is_taken(status)) {
         ++state.refused;
         return status;
@@ -163,7 +163,7 @@ tracking::SampleStatus StickFilters::correct(const tracking::PoseSample& sample,
     return status;
 }
 
-void StickFilters::say_paths(tracking::StickState& state) const {
+void StickFilters::write_paths(tracking::StickState& state) const {
     const tracking::Predictor &picture = *picture_.predictor, &sound = *sound_.predictor;
     state.picture = path_of(picture, kLongestPredictionS, kPicturePieces);
     state.picture_t_s = picture.time_s();

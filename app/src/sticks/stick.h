@@ -17,7 +17,7 @@
 
 namespace app {
 
-/// What a stick's poses are predicted by.
+/// Specifications of a stick's predictors.
 struct StickPredictors {
     std::string picture, sound;
     std::string confirming;          ///< confirms the strikes that `sound` predicts; empty: none
@@ -30,7 +30,7 @@ struct StickPredictors {
                                                double sound_lead_s,
                                                const Eigen::Vector3d& shaft = -Eigen::Vector3d::UnitZ());
 
-/// One stick's filters, which get the same samples: what they know is a StickState, offline and in real time.
+/// One stick's filters, which get the same samples. Their state is a StickState, offline and in real time.
 /// One thread at a time.
 class StickFilters {
 public:
@@ -38,21 +38,21 @@ public:
     /// exist, std::runtime_error for an external one that does not start.
     StickFilters(const StickPredictors& predictors, const std::string& stick);
 
-    /// Takes the next sample and puts into `state` what the filters expect after it; returns what the sound's
-    /// filter made of it, by whose clock and count the state goes. Throws std::runtime_error when an external
-    /// predictor has failed.
+    /// Takes the next sample and writes the filters' predictions into `state`. Returns the status of the
+    /// sound's filter; the times and counts of the state are that filter's. Throws std::runtime_error when an
+    /// external predictor has failed.
     [[nodiscard]] tracking::SampleStatus correct(const tracking::PoseSample& sample,
                                                  tracking::StickState& state);
     /// As before the first sample: times may begin again. Only experience() stays.
     void begin_anew();
-    /// What the stick has taught the network of the pictures' predictor, if that learns: since it was made,
-    /// each time from the model on.
+    /// What the network of the pictures' predictor has learned from the stick since the StickFilters were
+    /// made, begin_anew() included; none if it does not learn.
     [[nodiscard]] std::optional<tracking::Experience> experience() const;
 
 private:
-    void say_paths(tracking::StickState& state) const;
+    void write_paths(tracking::StickState& state) const;
 
-    /// A predictor, and what makes another like it.
+    /// A predictor, and its maker, which can make it anew.
     struct Filter {
         Filter(const std::string& specification, std::span<const double> leads_s, const TrackedStick& stick)
             : maker(specification), predictor(maker.make(leads_s, stick)) {}
@@ -74,8 +74,9 @@ private:
 /// 0 to lead in equal pieces.
 [[nodiscard]] std::vector<double> leads_up_to(double lead_s, std::size_t pieces);
 
-/// The path of the tip at those leads from a newest sample at `time_s`, of a pose by lead. None if it moves
-/// as no stick can (samples that jump within microseconds): such a path makes no contact.
+/// The path of the tip at those leads after the newest sample, of time `time_s`. `pose_after`: the predicted
+/// pose by lead. None if it moves as no stick can (samples that jump within microseconds): such a path makes
+/// no contact.
 [[nodiscard]] std::optional<sim::TipPath> predicted_path(
     const std::function<tracking::PosePrediction(double)>& pose_after, double time_s,
     const StickGeometry& geometry, std::uint32_t stick, std::span<const double> leads_s);
@@ -85,8 +86,8 @@ private:
 /// later.
 void keep_confirmed(std::vector<sim::Contact>& contacts, std::span<const sim::Contact> confirming, double s);
 
-/// The straight way of a tip from one sample to the next, `interval_s` later, as if it began at the later one's time
-/// `t_s`: bodies are known from then on.
+/// The straight way of a tip from one sample to the next, `interval_s` later, moved in time so that it begins
+/// at the later sample's time `t_s`: a simulation that has reached t_s cannot sweep an earlier path.
 [[nodiscard]] sim::TipPath measured_way(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double t_s,
                                         double interval_s, double tip_radius_m);
 
@@ -104,8 +105,8 @@ inline constexpr double kLongestPredictionS = 0.15;
 /// How far ahead the confirming path reaches [s].
 inline constexpr double kConfirmingLeadS = 0.1;
 
-/// One stick after its newest sample, and where it is expected to go: what strikes and pictures ask of the
-/// StickState that its filters published, in this process or another.
+/// One stick after its newest sample, and its predicted motion, from the StickState that its filters
+/// published, in this process or another.
 class Stick {
 public:
     /// `sound_lead_s`: how far ahead predicted_path() reaches.
@@ -141,9 +142,9 @@ public:
     /// The path that a model of the sound's filter predicts over [0, sound lead] from its newest sample, and
     /// the measured tip as a path that stands still.
     [[nodiscard]] sim::TipPath predicted_path(std::size_t model) const;
-    /// That of the filter which confirms strikes, where there is one.
+    /// The path of the confirming filter, where there is one.
     [[nodiscard]] std::optional<sim::TipPath> confirming_path() const;
-    /// The tip as a network sees it, of the samples that take() was given; false where it has too few.
+    /// The network's inputs from the samples that take() was given; false where there are too few.
     [[nodiscard]] bool look(tracking::TipView& view) const { return history_.look(view); }
     [[nodiscard]] double sound_lead_s() const { return sound_lead_s_; }
     [[nodiscard]] sim::TipPath measured_path() const;

@@ -11,26 +11,28 @@
 
 namespace app {
 
-/// When a stick will strike by the network of contacts of a model.
+/// Predicts a stick's next strike by the network of contacts of a model.
 ///
-/// Each surface is looked at as the plane that touches it where the path of the sound's predictor meets it, or, if it
-/// does not, is nearest to it. The network says when the tip meets it (tracking::contact_times); the surface that is
-/// met with the greatest probability counts. The time of the strike is the median t; its probability P that of a
-/// contact within 30 ms of t, in which a note and a contact belong together. Below P = 5 % nothing is expected.
+/// Each surface is replaced by its tangent plane where the path of the sound's predictor meets it, or, if it
+/// does not, is nearest to it. For each plane the network gives a distribution of the time to contact
+/// (tracking::contact_times); the surface with the greatest probability of a contact is the predicted one.
+/// The time t of the strike is the median of its distribution. Its probability P is that of a contact within
+/// 30 ms of t: within that time a note and a contact belong together. Below P = 5 % no strike is predicted.
 ///
-/// The answer is a path that meets the surface at t, to be swept as any other: along the surface that of the
-/// predictor, towards it at a constant acceleration from the tip's velocity, so that it falls all the way.
+/// The answer is a path that meets the surface at t and can be swept as any other. Along the surface it is
+/// the predictor's path; towards the surface it has a constant acceleration from the tip's velocity, so that
+/// it falls all the way.
 ///
 /// One thread. A pure function of its arguments.
 class ContactForecast {
 public:
-    /// Distance of a tip from a surface, by its number, and the normal there.
+    /// Distance of a tip from the surface of that number, and the normal there.
     using Nearest = std::function<sim::SurfacePoint(std::size_t, const Eigen::Vector3d&)>;
     struct Surfaces {
         std::size_t count = 0;
         Nearest nearest;
     };
-    /// What the tip is expected to do.
+    /// The path of the predicted strike.
     struct Path {
         sim::TipPath path;
         std::size_t surface = 0;
@@ -38,10 +40,10 @@ public:
     };
 
     struct Forecast {
-        /// By surface, of the time to it; none of one out of reach (tracking::contact_times) or that the tip is
-        /// beside. Empty where the tip is in a surface.
+        /// By surface, the distribution of the time to contact; none where it is out of reach
+        /// (tracking::contact_times) or the tip is beside it. Empty where the tip is in a surface.
         std::vector<std::optional<tracking::ContactTimes>> times;
-        std::optional<Path> strike;  ///< none where nothing is likely to be struck
+        std::optional<Path> strike;  ///< none where P is below 5 %
     };
 
     /// `model` has a network of contacts.

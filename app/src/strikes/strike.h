@@ -13,7 +13,7 @@ struct Strike {
     std::uint32_t stick = 0;       ///< index into the trace's sticks
     std::uint32_t instrument = 0;  ///< index into the kit's instruments
     std::int32_t zone = 0;         ///< index into the instrument's zones
-    std::uint32_t model = 0;       ///< of the predictor's models, the one that its newest time comes from
+    std::uint32_t model = 0;       ///< the predictor's model that gave its newest time
     Outcome outcome = Outcome::pending;
     double contact_s = 0;                                     ///< predicted contact, trace clock
     std::int64_t onset_sample = 0;                            ///< of audio.wav

@@ -12,51 +12,55 @@
 
 namespace app {
 
-/// What is expected of a stick after a sample.
+/// What is known and predicted of a stick after a sample.
 struct ExpectedStrikes {
-    double s = 0, interval_s = 0;  ///< of the sample; until the next one
-    /// [m] signed, from each surface: of the tip as measured, and as the sound's filter has it.
+    double s = 0, interval_s = 0;  ///< time of the sample; expected time to the next one
+    /// Signed distances [m] from each surface, of the measured tip and of the filtered one.
     std::span<const double> measured_m, filtered_m = {};
     std::vector<sim::Contact> passed =
         {};  ///< of bodies that the tip went right through since the sample before
-    /// Contacts of the path of the sound's predictor, and those of them that a second filter confirms (all, where there
-    /// is none). By time.
+    /// Contacts of the path of the sound's predictor, and those of them that the confirming filter confirms
+    /// (all, without such a filter). By time.
     std::vector<sim::Contact> path = {}, confirmed = {};
     std::vector<sim::Contact> network =
-        {};  ///< of the path that a network of contacts expects (ContactForecast)
-    /// By surface, what that network says of the time to it; empty without a network.
+        {};  ///< of the path that a network of contacts predicts (ContactForecast)
+    /// By surface, that network's distribution of the time to contact; empty without a network.
     std::span<const std::optional<tracking::ContactTimes>> times = {};
-    bool known =
-        false;  ///< the stick moves as those that the network was learned from (tracking::KnownMotion)
+    bool known = false;  ///< the stick moves as those that the network was trained on (tracking::KnownMotion)
 };
 
-/// Contacts that are kept in mind, and those that sound.
+/// The contacts that are tracked, and those of them that are to sound.
 struct DecidedStrikes {
     std::vector<sim::Contact> kept, sounding;
-    /// [s] By surface: a note that is fixed before the next sample, and whose onset lies before this, is cancelled.
+    /// By surface [s]: a note that will be fixed before the next sample, with an onset before this, is
+    /// cancelled.
     std::vector<double> silent_until_s;
 };
 
-/// Whether a stick's notes are to sound, and when. Two say when it will strike: the path of the sound's predictor, and,
-/// with a model that has one, the network of contacts. Each is heard by what it turned out to be worth:
+/// Decides which of a stick's predicted strikes sound, and when. There are two predictions: the path of the
+/// sound's predictor, and, with a model that has one, the network of contacts. Each counts by how often it
+/// was right:
 ///
-/// - A missed strike costs 1, a false sound `false_cost`: a note sounds where false_cost (1 - P) < P, with P the share
-///   that came of the last 20 strikes expected by the same: by the path alone, by the network alone, or by both;
-///   together with 20 strikes of which 0.95 came, for the network alone with 4 of which 0.05 came, or, where the motion is
-///   known (tracking::KnownMotion), 0.8. So what the path expects falls silent, at a cost of 1, only where hardly
-///   anything comes of it. The question is put at the last sample before the note is fixed, as until then it costs
-///   nothing to wait; to the network alone at each sample. A strike that fell silent and comes all the same sounds late:
-///   what the path still expects when the tip is seen in the surface is not asked about.
-/// - Where the motion is known, the network is a second witness of each note: with p its probability of a contact up to
-///   30 ms after the note and P0 = 0.95 (0.8 for what it alone expects) before it was asked, the note sounds where
+/// - A missed strike costs 1, a false sound `false_cost`: a note sounds where false_cost (1 - P) < P. P is
+///   the share of strikes that came true among the last 20 of the same kind: predicted by the path alone, by
+///   the network alone, or by both. The prior of P is 20 strikes of which 95 % came true; for the network
+///   alone 4 strikes of which 5 %, or, where the motion is known (tracking::KnownMotion), 80 % came true. So
+///   at a cost of 1 strikes of the path are silenced only where hardly any comes true. The decision is made
+///   at the last sample before the note is fixed, since waiting until then costs nothing; for strikes of the
+///   network alone it is made at each sample. A strike that was silenced and comes true sounds late: one that
+///   the path still predicts when the measured tip is in the surface always sounds.
+/// - Where the motion is known, the network decides about each note, too. With p its probability of a contact
+///   up to 30 ms after the note, and the prior P0 = 0.95 (0.8 for strikes of the network alone), the note
+///   sounds where
 ///     false_cost (1 - P0) (1 - p) < P0 p.
-///   P0 stays as it is: what came of other strikes, p tells apart from this one.
-/// - A strike's time and speed are the network's where its errors of time have turned out smaller: by their sum over all
-///   samples at which both expected the strike, each weighing 0.98 of the next, and 10 ms at first, which are the
-///   network's, or, where the motion is known, the path's. So one begins with the path unless the motion is known.
+///   P0 does not follow earlier strikes, because p already tells this strike from them.
+/// - A strike's time and speed are those of the prediction with the smaller errors of time: the sum over all
+///   samples at which both predicted the strike, each sample weighing 0.98 of the next. The sum of the
+///   network begins with 10 ms, or, where the motion is known, that of the path. So one begins with the path
+///   unless the motion is known.
 ///
-/// A strike came if the measured tip entered the surface, 3 mm deep, or passed right through it between two samples, within
-/// 30 ms of when it was expected.
+/// A strike came true if, within 30 ms of its predicted time, the measured tip entered the surface, 3 mm
+/// deep, or passed right through it between two samples.
 ///
 /// One stick (and model of a predictor with several). One thread. Deterministic.
 class StrikeDecision {
@@ -79,12 +83,12 @@ private:
         std::optional<double> entered_s = {};
     };
     enum Kind : std::size_t { path_alone, network_alone, both };
-    /// What was expected of a surface, until it is known what came.
+    /// A predicted strike on a surface, until it is known whether it came true.
     struct Forecast {
         std::size_t surface = 0;
         Kind kind = both;
-        std::optional<double> path_s = {}, network_s = {};  ///< when
-        bool counts = false;                                ///< in the share of its kind
+        std::optional<double> path_s = {}, network_s = {};  ///< predicted times
+        bool counts = false;                                ///< in the Share of its kind
         bool came = false;
     };
 
@@ -93,14 +97,14 @@ private:
     void settle(double s);
     void decide(std::size_t surface, const ExpectedStrikes& expected, DecidedStrikes& decided);
 
-    /// Of the strikes that were expected, how many came.
+    /// How many of the last predicted strikes came true.
     struct Share {
-        double came = 0, of = 0;  ///< of the last ones
+        double came = 0, of = 0;
         void add(bool it_came);
     };
     [[nodiscard]] static double prior(Kind kind, bool known);
     [[nodiscard]] double probability(Kind kind, bool known) const;
-    /// Notes of a surface that is struck, as `kind` expects, are silent before this.
+    /// DecidedStrikes::silent_until_s for a surface on which a strike of this kind is predicted.
     [[nodiscard]] double silent_until_s(std::size_t surface, Kind kind,
                                         const ExpectedStrikes& expected) const;
 

@@ -21,17 +21,19 @@ struct NextStrike {
 /// How far ahead strikes are looked for [s].
 inline constexpr double kStrikeHorizonS = 0.15;
 
-/// Says of one stick, sample by sample, when it will strike next and how likely that is.
+/// Predicts after each sample when one stick will strike next, and with which probability.
 ///
-/// With d the distance of the tip from a surface at a lead of the predicted path, n its normal and C the covariance of
-/// the tip as the predictor states it (without one, 1 mm each way), the depth is z = -d / sqrt(n' C n), within +-4, and
+/// With d the distance of the tip from a surface at a lead of the predicted path, n its normal and C the
+/// covariance of the tip as the predictor states it (without one, 1 mm each way), the depth is z = -d /
+/// sqrt(n' C n), within +-4, and
 ///
 ///   probability = 1 / (1 + exp(-(a + b z))),  z the greatest up to the horizon         (Platt 1999)
 ///
-/// of the body whose z is greatest; `in_s` is when the mean path meets it, or, if it does not, when z is greatest. A
-/// surface that the tip is in counts once it has left it. A stick does not pass where it strikes, so what the errors
-/// of a path say is no probability of a strike: a and b begin as 0 and 1 and follow what came of the forecasts
-/// 0.15 s later (contacts are 3 mm deep), by steps of the likelihood's slope, 2 /s times the time between samples.
+/// of the body whose z is greatest; `in_s` is when the mean path meets it, or, if it does not, when z is
+/// greatest. A surface that the tip is in is left out until the tip has left it. A stick stops at a surface
+/// that its predicted path passes through, so the depth needs calibration: a and b begin as 0 and 1 and are
+/// learned from the outcome of each forecast 0.15 s later (contacts are 3 mm deep), by gradient ascent of the
+/// likelihood at a rate of 2 /s times the time between samples.
 ///
 /// One thread. Deterministic.
 class StrikeForecast {
@@ -39,8 +41,8 @@ public:
     StrikeForecast(const StickGeometry& geometry, const std::vector<sim::BodyDefinition>& bodies)
         : geometry_(geometry), bodies_(bodies), outside_(bodies.size()) {}
 
-    /// After the predictor has got a sample of that time; predictions are from `behind_s` before it. None where no
-    /// body is in reach.
+    /// To be called after the predictor got the sample of time t_s. `behind_s`: how far the predictor's state
+    /// lies behind it (tracking::feed). None where no body is in reach.
     [[nodiscard]] std::optional<NextStrike> after(const tracking::Predictor& predictor, double t_s,
                                                   double behind_s);
     /// The leads that a predictor is asked for.
@@ -76,7 +78,7 @@ private:
 
     StickGeometry geometry_;
     std::vector<sim::BodyDefinition> bodies_;
-    std::vector<bool> outside_;  // of each body, the tip was, and has not struck since
+    std::vector<bool> outside_;  // by body: the tip was outside it, and has not struck it since
     double a_ = 0, b_ = 1;
     std::optional<double> newest_s_;
     std::deque<Forecast> forecasts_;  // by time

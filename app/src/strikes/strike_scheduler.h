@@ -12,12 +12,13 @@
 
 namespace app {
 
-/// The constants of a strike's life (the strike rules of the README).
+/// When a predicted contact becomes a note, until when the note may still change, and which contacts make
+/// none.
 struct StrikeRules {
     double t0_s = 0;                  ///< time of audio sample 0
     double release_margin_s = 0.010;  ///< a note is fixed this long before its onset
-    /// Its time is fixed this long before its onset, >= release_margin_s: `play` moves a note until its release,
-    /// `compare` fixes the time the lead ahead.
+    /// A note's time is fixed this long before its onset, >= release_margin_s: in `play` at its release, in
+    /// `compare` the lead ahead.
     double commit_lead_s = 0.010;
     double late_s = 0.030;    ///< a stroke found later than this after its contact is not played
     double revive_s = 0.030;  ///< a contact predicted again this near to a cancelled onset keeps its id
@@ -29,10 +30,10 @@ struct StrikeRules {
     double sent_lead_s = std::numeric_limits<double>::infinity();
 };
 
-/// What one of a predictor's models expects after a sample.
+/// What one of a predictor's models predicts after a sample.
 struct ModelContacts {
     std::span<const sim::Contact> contacts;  ///< of its predicted path, by time
-    /// [m] signed, of its tip at lead 0 from each instrument's surface grown by the tip's radius
+    /// Signed distances [m] of its tip at lead 0 from each instrument's surface grown by the tip's radius
     std::span<const double> clearance_m;
     /// By instrument: notes that will be fixed before the next sample, and whose onset lies before this, are
     /// cancelled (DecidedStrikes); empty: none.
@@ -50,19 +51,19 @@ struct MeasuredTip {
 /// Turns predicted contacts into strikes.
 ///
 /// Contacts: every (stick, instrument, model) holds a list of pending contacts that each new sample confirms,
-/// moves or cancels until their release point. Doubles are prevented by geometry alone: after a release the list
-/// takes no contact until the tip, as measured and as filtered, has risen `rearm_m` from its lowest point and is
-/// `rearm_m` outside the surface. With a commit lead beyond the release margin a contact's time stands from that
-/// lead on, while it may still be cancelled, and taken up again.
+/// moves or cancels until their release point. Doubles are prevented by geometry alone: after a release the
+/// list takes no contact until the tip, as measured and as filtered, has risen `rearm_m` from its lowest
+/// point and is `rearm_m` outside the surface. With a commit lead beyond the release margin a contact's time
+/// stands from that lead on, while it may still be cancelled, and taken up again.
 ///
-/// Strikes: the pending contacts of the selected model are those that are played. When the selection changes, a
-/// strike goes on with the new model's contact within `revive_s` of it, or is cancelled. A model that was not
-/// selected when its own contact was released stands by that stroke: another model's contact within `late_s` of
-/// it is played. One stroke makes one note: of several models none is released after a note until the measured tip
-/// has risen `rearm_m`. With one model every pending contact is a strike.
+/// Strikes: the pending contacts of the selected model are those that are played. When the selection changes,
+/// a strike goes on with the new model's contact within `revive_s` of it, or is cancelled. When the selected
+/// model has already released its own contact of a stroke, while it was not selected, another model's contact
+/// within `late_s` of that is played. One stroke makes one note: of several models none is released after a
+/// note until the measured tip has risen `rearm_m`. With one model every pending contact is a strike.
 ///
-/// Causal: the call for a sample at s changes only notes with onset >= s + release margin. Times in seconds of
-/// the trace's clock.
+/// Causal: the call for a sample at s changes only notes with onset >= s + release margin. Times in seconds
+/// of the trace's clock.
 class StrikeScheduler {
 public:
     StrikeScheduler(const StrikeRules& rules, std::size_t sticks, std::size_t instruments);
@@ -73,11 +74,11 @@ public:
     void advance_to(double s, double fixed_s = -std::numeric_limits<double>::infinity());
     /// The filter of `stick` starts anew: its next sample is a first sample.
     void restart(std::uint32_t stick);
-    /// The sample of `stick` at time s: what each model expects (as many at every sample), and the model that is
-    /// selected.
+    /// Takes the sample of `stick` at time s: the contacts of each model, the same number of models at every
+    /// sample, and which one is selected.
     void sample(std::uint32_t stick, double s, std::span<const ModelContacts> expected, std::size_t selected,
                 const MeasuredTip& tip);
-    /// After the last sample: what is pending is released, as when a sensor falls silent.
+    /// After the last sample: releases the pending contacts, as when a sensor falls silent.
     void finish();
 
     [[nodiscard]] const std::vector<Strike>& strikes() const { return strikes_; }
@@ -88,8 +89,8 @@ public:
     [[nodiscard]] std::vector<std::uint64_t> take_released();
 
 private:
-    /// What one stick is doing above one instrument, as one model sees it. A contact is kept as the strike that
-    /// it would make; its id is that of the strike that it has made, 0 for none.
+    /// One stick above one instrument, by one model. A pending contact is kept as the strike that it would
+    /// make, with the id of the strike that it has made, 0 for none.
     struct Approach {
         std::uint32_t stick = 0, model = 0;
         bool armed = false;
@@ -115,7 +116,8 @@ private:
         std::optional<Struck> struck;
         std::vector<std::uint64_t> strikes;  ///< ids of those pending or cancelled, newest last; a few
 
-        /// One model's own arming prevents doubles; that of several does not know what the others have played.
+        /// With several models the arming of one does not prevent doubles: it does not know the others'
+        /// notes.
         [[nodiscard]] bool is_closed() const { return struck && approaches.size() > 1; }
     };
     /// A contact of the predicted path that may be a strike.
@@ -144,10 +146,10 @@ private:
     /// Whether a candidate may be the pending contact itself. A contact whose time stands is not confirmed by
     /// one that would come more than late_s after it; one that would come sooner will sound late.
     [[nodiscard]] bool may_be(const Strike& pending, const Candidate& candidate, double s) const;
-    /// Of a pending contact that the path no longer shows.
+    /// Handles a pending contact that the path no longer shows.
     void keep_or_cancel(Approach& a, double s, Strike& pending, bool may_keep) const;
-    /// Cancels what will be fixed before the next sample, as long after this as this is after the one before, and
-    /// sounds before `until_s`.
+    /// Cancels contacts with an onset before `until_s` that will be fixed before the next sample. That one is
+    /// expected after the same interval as the last.
     void silence(Approach& a, double s, double until_s) const;
     static void cancel(Approach& a, Strike& pending);
 
@@ -155,7 +157,8 @@ private:
     void play_selected(Pair& pair, double s);
     /// Opens the surface to all models when the tip has risen since the last note.
     void open_again(Pair& pair, double s, double measured) const;
-    /// Whether a contact's model is selected, or the selected model stands by the same stroke.
+    /// Whether a contact's model is selected, or the selected model has released its own contact of the same
+    /// stroke.
     [[nodiscard]] bool is_selected(const Pair& pair, const Strike& pending) const;
     /// The pending contact becomes a strike, or the strike that it has made follows it.
     void play(Pair& pair, Strike& pending, double s, std::span<const std::uint64_t> played);

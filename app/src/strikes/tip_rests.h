@@ -15,17 +15,17 @@ struct TipRest {
     std::uint32_t stick = 0, instrument = 0;
 };
 
-/// Says when a stick's tip chokes what it lies on, as a drummer stops a cymbal.
+/// Finds when a stick's tip chokes the instrument that it lies on, as a drummer stops a cymbal.
 ///
-/// A tip rests on an instrument while it is at most 3 mm off its surface (or in it, as strokes in the air are) and within
-/// 5 mm of where it came to rest. Once it has rested for the instrument's hold time, it ends what strokes rang up to then;
-/// as long as it lies there, further strokes of other sticks, too. A stroke that turns back at more than
-/// 8 x 5 mm / hold^2 (4 m/s^2 for 0.1 s) is no rest.
+/// A tip rests on an instrument while it is at most 3 mm off its surface (or in it: in the air nothing stops
+/// a stick) and within 5 mm of where it came to rest. Once it has rested for the instrument's hold time, it
+/// ends the sound of strokes up to then, and, as long as it lies there, that of further strokes of other
+/// sticks. A stroke that turns back at more than 8 x 5 mm / hold^2 (4 m/s^2 for 0.1 s) is no rest.
 ///
 /// One thread. A pure function of the calls.
 class TipRests {
 public:
-    /// hold_s: by instrument; 0: never.
+    /// hold_s: the hold time by instrument; 0: tips never choke it.
     TipRests(std::vector<double> hold_s, std::size_t sticks)
         : hold_s_(std::move(hold_s)),
           struck_s_(hold_s_.size(), -std::numeric_limits<double>::infinity()),

@@ -18,7 +18,7 @@ inline constexpr double kMatchWindow_s = 0.030;
 /// A contact goes at least so deep; the next can come once the tip has been so far outside.
 inline constexpr double kContactDepth_m = 0.003, kRearm_m = 0.003;
 
-/// How far a note's strike is from the contact that it belongs to, beside its time.
+/// Errors of a note's strike against the contact that it belongs to, apart from its time.
 struct StrikeDynamics {
     double speed_percent = 0;  ///< predicted over true normal speed, less 1
     double speed_db = 0;       ///< 20 log10 of that ratio
@@ -35,7 +35,7 @@ struct StrikeScore {
     int false_turned_late = 0;  ///< the other false notes
     /// Of |onset - true contact| over the matched notes; kNoValue when none matched.
     double timing_median_ms = kNoValue, timing_p95_ms = kNoValue;
-    /// Of the sizes of their StrikeDynamics; kNoValue likewise.
+    /// Of the absolute values in their StrikeDynamics; kNoValue likewise.
     double speed_median_percent = kNoValue, speed_p95_percent = kNoValue, speed_median_db = kNoValue,
            speed_p95_db = kNoValue, place_median_mm = kNoValue, place_p95_mm = kNoValue;
 };

@@ -65,11 +65,11 @@ TEST(Report, PlaysTheSoundAShortOneFromWithinThePage) {
     EXPECT_EQ(
         count(report_of(sample_play_result()), "<audio controls preload=metadata src=\"data:audio/mpeg"), 1U);
     app::PlayResult result = sample_play_result();
-    result.audio = {};
+    result.sound.samples = {};
     const std::vector<float> second(2 * 48000);
-    for (int i = 0; i <= 300; ++i) result.audio.append(second);  // five minutes stay within the page
+    for (int i = 0; i <= 300; ++i) result.sound.samples.append(second);  // five minutes stay within the page
     EXPECT_EQ(count(report_of(result), "<audio controls preload=metadata src=\"audio.wav\">"), 1U);
-    result.audio = {};
+    result.sound.samples = {};
     EXPECT_FALSE(holds(report_of(result), "<audio"));
 }
 
@@ -77,7 +77,7 @@ TEST(Report, ShowsTheVideoWhereItLies) {
     app::PlayResult result = sample_play_result();
     EXPECT_FALSE(holds(report_of(result), "<video"));
     result.options.video = "my take.mp4";
-    result.report_video = "../my%20take.mp4";
+    result.pictures.video = "../my%20take.mp4";
     EXPECT_TRUE(holds(report_of(result), "<video controls preload=metadata src=\"../my%20take.mp4\">"));
 }
 
@@ -116,7 +116,7 @@ TEST(Report, AFilmIsItsFramesSideBySideWithABarBelow) {
     EXPECT_EQ(kept.rgb[3 * 4], 99) << "a picture that is at hand is not read";
     EXPECT_EQ(kept.rgb[3 * 8], 121);
     app::PlayResult result = sample_play_result();
-    result.report_films = {film};
+    result.pictures.films = {film};
     EXPECT_TRUE(holds(report_of(result), "<div class=film style=\"--n:4;--s:0.80s;aspect-ratio:8/8\">"));
 }
 TEST(Report, EveryPlotIsAWholeSvgWithALabelAndFollowsThePagesColours) {
@@ -178,13 +178,13 @@ TEST(Report, NamesAreTextWhateverTheyHold) {
     const std::string hostile =
         "'; system('touch " + touched + "'); `touch " + touched + "`\nset output <script>alert(1)</script>";
     result.trace = result.kit_name = result.trace_source = result.options.picture_predictor = hostile;
-    result.options.sound_predictor = result.fingerprint = hostile;
+    result.options.sound_predictor = result.origin.fingerprint = hostile;
     result.options.kit = hostile;
     for (std::string& name : result.instruments) name = hostile;
     for (std::string& name : result.sticks) name = hostile;
     for (app::TipTrack& track : result.tracks) track.stick = hostile;
-    result.inputs = {{hostile, hostile}};
-    result.versions = {{hostile, hostile}};
+    result.origin.inputs = {{hostile, hostile}};
+    result.origin.versions = {{hostile, hostile}};
     const std::string page = report_of(result);
     EXPECT_FALSE(holds(page, "<script"));
     EXPECT_FALSE(fs::exists(touched));
@@ -199,8 +199,8 @@ TEST(Report, OfARunWithoutAnythingIsAPageNonetheless) {
     EXPECT_FALSE(holds(page, "<h2>Sound"));
     EXPECT_FALSE(holds(page, "<h2>Frames"));
     app::PlayResult silent = sample_play_result();
-    silent.audio = {};
-    silent.audio.append(std::vector<float>(2 * 48000));
+    silent.sound.samples = {};
+    silent.sound.samples.append(std::vector<float>(2 * 48000));
     EXPECT_TRUE(holds(report_of(silent), "Silence"));
 }
 
@@ -211,14 +211,14 @@ TEST(Report, FramesAreWithinWithTheirTimeAndTheNearestNote) {
     app::PlayResult result = sample_play_result();
     for (const auto& [name, bytes] : {std::pair{"000007.png", "Man"}, {"000029.png", "Ma"}}) {
         app::write_file(here.path() / name, std::string_view(bytes));
-        result.report_frames.push_back(here.path() / name);
+        result.pictures.frames.push_back(here.path() / name);
     }
     const std::string page = report_of(result);
     EXPECT_TRUE(holds(page, "base64,TWFu\">"));
     EXPECT_TRUE(holds(page, "base64,TWE=\">"));
     EXPECT_TRUE(holds(page, "<figcaption>0.333 s: 33 ms after snare (left)</figcaption>"));
     EXPECT_TRUE(holds(page, "<figcaption>1.067 s</figcaption>"));
-    result.report_frames.push_back(here.path() / "000030.png");
+    result.pictures.frames.push_back(here.path() / "000030.png");
     try {
         (void)report_of(result);
         FAIL();

@@ -16,6 +16,7 @@
 #include "files/bad_input.h"
 #include "kit/kit.h"
 #include "play/play_run.h"
+#include "strikes/strike_note.h"
 #include "temporary_folder.h"
 
 namespace app {
@@ -84,7 +85,7 @@ TEST(PlayRealtime, ALoopedTraceSoundsAsPlannedToTheSampleAndDepartsFromOfflineOn
     EXPECT_GE(outcome.realtime.laps, 3U);
     // The recording is what the offline sound makes of the same notes: every onset where events.csv says.
     if (outcome.realtime.refused_changes == 0) {
-        EXPECT_TRUE(std::ranges::equal(outcome.play.audio, offline_sound(outcome)));
+        EXPECT_TRUE(std::ranges::equal(outcome.play.sound.samples, offline_sound(outcome)));
     }
     for (const NoteTiming& note : outcome.realtime.notes) {
         const Strike& strike = outcome.play.strikes[note.strike];

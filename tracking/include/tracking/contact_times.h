@@ -30,7 +30,7 @@ struct ContactTimes {
     [[nodiscard]] double median_s() const noexcept;
 };
 
-/// A tip as a network sees it: plain numbers.
+/// The network's inputs for a tip, and the axes and the speed that they refer to: plain numbers.
 struct TipView {
     static constexpr std::size_t kInputs = 88;
     Eigen::Vector3d tip = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();  ///< world, SI
@@ -41,7 +41,7 @@ struct TipView {
 
 class StickHistory;
 
-/// The newest 0.25 s of a stick's tip. Allocates when it is made; what a network sees costs about 1 us.
+/// The newest 0.25 s of a stick's tip. Allocates in its constructor only; look() takes about 1 us.
 class TipHistory {
 public:
     /// `shaft`: unit, hand to tip; `tip` [m]; both in the tracked body's frame.
@@ -53,7 +53,7 @@ public:
     void restart() noexcept;
     /// A sample newer than the ones before.
     void push(PoseSample sample) noexcept;
-    /// False until three samples are held: then there is nothing to look at.
+    /// Writes the network's inputs; false while fewer than three samples are held.
     [[nodiscard]] bool look(TipView& view) const noexcept;
 
 private:
@@ -61,13 +61,14 @@ private:
     std::unique_ptr<StickHistory> history_;
 };
 
-/// What the network of `model.contacts`, which must be there, says of a plane; no probability where the tip is
-/// beneath it or 0.25 s of its mean speed over it, which is not learned from. Allocates nothing.
+/// The answer of the network `model.contacts`, which must be there, for a plane. The probability is 0 where
+/// the tip is beneath the plane, or farther above it than the mean speed covers in 0.25 s: the training has
+/// no such planes. Allocates nothing.
 ///
-///   x  what PathModel's network gets, of the tip in place of the tracked point; the plane's normal (forward, up,
-///      across); the distance d over the speed v, within 0 and 0.25 s; asinh(d / v / 5 ms); the 13 mean velocities
-///      of the tip along the normal, over v
-///   y  18 bins of 1/120 s and "none": their logarithms of odds
+///   x  the inputs of PathModel's network, for the tip in place of the tracked point; the plane's normal
+///      (forward, up, across); the distance d over the speed v, within 0 and 0.25 s; asinh(d / v / 5 ms); the
+///      13 mean velocities of the tip along the normal, over v
+///   y  logits of 18 bins of 1/120 s and of "no contact"
 [[nodiscard]] ContactTimes contact_times(const PathModel& model, const TipView& view,
                                          const Plane& plane) noexcept;
 

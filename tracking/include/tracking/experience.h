@@ -10,13 +10,13 @@
 
 namespace tracking {
 
-/// What a stick has taught the network of a predictor (`online`, `arbitrated`): the sums A (its lower triangle) and B of
-/// OnlineLayer, and the trust that the network has earned where it is weighed (`arbitrated`).
+/// What the network of a predictor (`online`, `arbitrated`) has learned from one stick: the sums A (its lower
+/// triangle) and B of OnlineLayer, and, for `arbitrated`, the network's errors beside the filter's (Trust).
 struct Experience {
     Eigen::MatrixXd moments, against;  ///< n x n, n x 30
     std::optional<Trust> trust = {};
 
-    /// And what was learned before from the same model; trust is that of the end.
+    /// Adds what was learned earlier from the same model. The trust stays: it is the newest.
     Experience& operator+=(const Experience& other) {
         moments += other.moments;
         against += other.against;
@@ -24,12 +24,13 @@ struct Experience {
     }
 };
 
-/// None of a predictor that does not learn. `stick`: the name of the stick that it follows.
+/// What a predictor has learned; none if it does not learn. `stick`: the name of the stick that it follows.
 [[nodiscard]] std::optional<Experience> experience_of(const Predictor& predictor,
                                                       const std::string& stick = "-");
 
-/// The model that sticks began with, its last layer as they have taught it together, with their trust, without provenance. Throws
-/// std::invalid_argument for an experience of a model of another size.
+/// The model with a last layer that is solved from the experiences of all sticks together, and with their
+/// trust; without provenance. `model`: the one that all of them began with. Throws std::invalid_argument for
+/// an experience of a model of another size.
 [[nodiscard]] PathModel taught(const PathModel& model, std::span<const Experience> experiences);
 
 }  // namespace tracking

@@ -9,9 +9,10 @@ namespace tracking {
 
 /// Whether a stick moves as those that a model was learned from.
 ///
-/// The model's path (PathModel), which stays as it is, predicts the tracked point 1/15 s ahead; so does the velocity
-/// between the newest sample and the one before it that is 1/150 s older or more. With the errors e that turned out while the stick moved, the newest weighing most
-/// (exp(-age / 10 s)), the motion is known once they cover 0.4 s and
+/// Two predictions of the tracked point, 1/15 s ahead, are compared: the model's path (PathModel, without
+/// learning), and the velocity between the newest sample and one at least 1/150 s older. The errors e of both
+/// are summed while the stick moves, with weights exp(-age / 10 s). The motion is known once the errors cover
+/// 0.4 s and
 ///   sum |e_model|^2 < r^2 sum |e_velocity|^2,  r = 0.65.
 ///
 /// One stick; a pure function of its samples. Allocates when it is made; a sample costs about 1 us.
@@ -23,7 +24,7 @@ public:
     KnownMotion& operator=(KnownMotion&& other) noexcept;
     ~KnownMotion();
 
-    /// Samples that are not newer are passed over. A gap (kGapS) takes nothing from what has turned out.
+    /// Ignores samples that are not newer. A gap (kGapS) leaves the sums as they are.
     void push(const PoseSample& sample) noexcept;
     [[nodiscard]] bool is_known() const noexcept;
 

@@ -23,12 +23,12 @@ inline constexpr bool kCopiesAsBytes = std::is_trivially_copyable_v<T>;
 ///
 /// A reader takes n, and the words of its slot if the sequence is 2n before and after. That slot is written
 /// again after three more publications, so only a reader that is overtaken by them has to try again. Words
-/// are atomic: stored with release and loaded with acquire, so that who sees a word of a later value also
-/// sees the odd sequence stored before it. No fences, no locks: the writer never waits, and a reader tries
-/// the newest slot at most four times, then those before it once each, whatever happens to the writer in
-/// between (also SIGKILL in mid-write: the value is not counted, and the next one takes its slot). What one
-/// reader gets is never older than what it got before. One writer at a time; a new writer process goes on
-/// where a dead one stopped.
+/// are atomic: stored with release and loaded with acquire, so that a reader that sees a word of a later
+/// value also sees the odd sequence stored before it. No fences, no locks: the writer never waits, and a
+/// reader tries the newest slot at most four times, then those before it once each, whatever happens to the
+/// writer in between (also SIGKILL in mid-write: the value is not counted, and the next one takes its slot).
+/// What one reader gets is never older than what it got before. One writer at a time; a new writer process
+/// goes on where a dead one stopped.
 template <class T>
 class NewestValue {
     static_assert(kCopiesAsBytes<T> && sizeof(T) % sizeof(std::uint64_t) == 0);

@@ -54,23 +54,23 @@ public:
     /// Whether predicted positions depend on orientations.
     [[nodiscard]] virtual bool heeds_orientation() const noexcept { return false; }
     /// What predict() depends on, as a value: motion()->after(lead_s) is predict(lead_s). None where a Motion
-    /// cannot say it: polynomials of degree 3, programs of one's own.
+    /// cannot express it: polynomials of degree 3, external programs.
     [[nodiscard]] virtual std::optional<Motion> motion() const noexcept { return std::nullopt; }
     /// The same of model `index`, of several in parallel.
     [[nodiscard]] virtual std::optional<Motion> motion_of_model(std::size_t /*index*/) const noexcept {
         return motion();
     }
 
-    /// Several models in parallel (3.25-3.28): how many, which one predict() speaks for, and what model
-    /// `index` alone predicts. An estimator of one model has only itself.
+    /// Several models in parallel (3.25-3.28): their number, the one whose prediction predict() returns, and
+    /// the prediction of model `index`. Most estimators have one model.
     [[nodiscard]] virtual std::size_t models() const noexcept { return 1; }
     [[nodiscard]] virtual std::size_t selected() const noexcept { return 0; }
     [[nodiscard]] virtual PosePrediction predict_model(std::size_t /*index*/, double lead_s) const noexcept {
         return predict(lead_s);
     }
 
-    /// Throws what made an estimator give up that runs in another process: correct() and predict() cannot
-    /// throw. To be called before a run's results are used.
+    /// An estimator that runs in another process may fail, but correct() and predict() cannot throw: the
+    /// failure is thrown here. To be called before a run's results are used.
     virtual void require_working() const {}
 };
 
@@ -82,9 +82,6 @@ public:
     predictor.require_working();
     return std::max(0.0, sample.t_s - predictor.time_s());
 }
-
-/// Longest pause between samples that an estimator bridges; after a longer one it starts anew.
-inline constexpr double kGapS = 0.1;
 
 /// Makes a predictor from its name and parameters in mm and s:
 ///
@@ -102,20 +99,21 @@ inline constexpr double kGapS = 0.1;
 ///   bank:cv=1e7,ca=3e8,alpha=30,singer=1e11,lead=0.0667   the model that was right a lead ago (3.28);
 ///                           score=likelihood: most likely (3.27) instead of nearest
 ///   imm:alpha=200,q1=1e9,q2=3e10,q3=1e12,rate=10             interacting Singer models, switching at `rate`
-///   surface:q=1e7,decay=8,r=0.5,gate=5    `cv`, which rebounds where strokes turn, its restitution learned; its turning lasts
+///   surface:q=1e7,decay=8,r=0.5,gate=5    `cv` that rebounds at the height where strokes turn back, with a
+///                           restitution that it learns; its angular velocity does not decay
 ///   learned                 a network, `model`, from the last 0.25 s: position, shaft, its own uncertainty
-///   online:memory=100       that network, its last layer learning what turns out, forgotten over 100 s
-///   arbitrated:memory=100,q=1e7,decay=8,r=0.5,gate=5         `surface` and `online`, weighed by the errors that they
-///                           turned out to make; with memory=0 `learned` in place of `online`
+///   online:memory=100       that network; its last layer learns from each stick, and forgets over 100 s
+///   arbitrated:memory=100,q=1e7,decay=8,r=0.5,gate=5         `surface` and `online`, weighted by their
+///                           recent errors; with memory=0 `learned` in place of `online`
 ///
 /// The numbers shown are the defaults. Orientation is filtered by the same model about its own quaternion.
-/// thesis, cv, ca, singer, bank, imm, surface and arbitrated also take: `r=0.25`, the sensor's noise; `p0=10`, `v0=1000`,
-/// `a0=1e4`, standard deviations of the start; `gate=G`: samples beyond G standard deviations that a stick
-/// cannot have made (25 m/s, 3000 m/s^2, contacts excepted) are outliers. thesis, cv, ca and singer take
-/// `steady=HZ`: the steady gain of that rate. `shaft`, a unit vector from hand to tip in the tracked body's frame,
-/// is what learned, online and arbitrated follow; `model` is copied. Throws
-/// std::invalid_argument with one line (found, expected) for an unknown name, key or value, and where there is
-/// no model for what needs one.
+/// thesis, cv, ca, singer, bank, imm, surface and arbitrated also take: `r=0.25`, the sensor's noise;
+/// `p0=10`, `v0=1000`, `a0=1e4`, standard deviations of the start; `gate=G`: samples beyond G standard
+/// deviations that a stick cannot have made (25 m/s, 3000 m/s^2, contacts excepted) are outliers. thesis, cv,
+/// ca and singer take `steady=HZ`: the steady gain of that rate. `shaft`, a unit vector from hand to tip in
+/// the tracked body's frame, is what learned, online and arbitrated follow; `model` is copied. Throws
+/// std::invalid_argument with one line (found, expected) for an unknown name, key or value, and where there
+/// is no model for what needs one.
 [[nodiscard]] std::unique_ptr<Predictor> make_predictor(
     const std::string& specification, const Eigen::Vector3d& shaft = -Eigen::Vector3d::UnitZ(),
     const std::shared_ptr<const PathModel>& model = {});

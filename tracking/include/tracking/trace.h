@@ -18,6 +18,9 @@ struct PoseSample {
         false;  ///< false: position only; orientation is then the newest known one (the identity before any)
 };
 
+/// Longest pause between two samples of a stick that is bridged; after a longer one estimators start anew.
+inline constexpr double kGapS = 0.1;
+
 /// Samples of one stick, t_s strictly increasing, at least two.
 struct StickTrace {
     std::string name;

@@ -11,14 +11,14 @@ namespace tracking {
 
 struct PathModel;
 
-/// How far the network of a stick had proven itself against its filter when a performance ended (predictor
-/// `arbitrated`): what the next one begins with.
+/// The errors of a stick's network beside those of its filter when a performance ended (predictor
+/// `arbitrated`). The next performance begins with them.
 struct Trust {
     static constexpr std::size_t kLeads = 5;
     static constexpr double kMostLog = 40;  ///< of a radius either way: finite whatever comes
 
-    /// The sums of an arbiter: over the errors e_F of the filter and e_M of the model and over the way M - F between
-    /// them, each weighing its share of time.
+    /// The sums of an Arbiter, over time: of the errors e_F of the filter and e_M of the model, and of the
+    /// difference M - F of their predictions.
     struct Sums {
         double known_s = 0;        ///< errors of so long are known [s]
         double against = 0;        ///< of -e_F.(M - F), weights exp(-age / 2 s) [m^2 s]
@@ -31,13 +31,12 @@ struct Trust {
     struct Radii {
         double log_50 = std::log(kRadius50), log_95 = std::log(kRadius95);
     };
-    /// What the stated covariances turned out to be worth: of `errors` errors, the mean of their squared distances in
-    /// units of the covariance.
+    /// Calibration of the stated covariances: the mean squared Mahalanobis distance of `errors` errors.
     struct Scale {
         double errors = 0, mean = 3;
         Radii radii;
     };
-    /// Of one lead of the network: of the position, and of the shaft's direction (without unit in place of m).
+    /// For one lead of the network. The shaft's direction has no unit where the position has m.
     struct Lead {
         Sums position, shaft;
         Scale regions;
@@ -47,8 +46,8 @@ struct Trust {
     std::array<Lead, kLeads> leads;
 };
 
-/// Before the first sample: begins with the trust that the model has in the stick of that name, if it has any and the
-/// predictor weighs a network.
+/// Restores the trust that the model holds for the stick of that name, before the first sample. Does nothing
+/// where the model holds none, or the predictor is not `arbitrated`.
 void begin_with_trust(Predictor& predictor, const PathModel& model, std::string_view stick);
 
 }  // namespace tracking
