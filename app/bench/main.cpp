@@ -7,11 +7,14 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bench/bench_hard.h"
@@ -36,10 +39,14 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+using Show = std::function<void(const std::string& text)>;
+
 struct Bench {
     std::string name;
+    std::string length;                      ///< of all of it, on two cores
     std::vector<std::string_view> products;  ///< of its folder; the first is the JSON document
-    Figures (*measure)(const std::string& name, const BenchOptions& options);
+    /// Shows tables as soon as they are there; the text of its figures is what is left to show.
+    Figures (*measure)(const std::string& name, const BenchOptions& options, const Show& show);
 };
 
 void say(const std::string& line) {
@@ -63,20 +70,50 @@ SimBenchOptions::Scene balls_of(const std::string& name) {
     return {scene.name, scene.world};
 }
 
-Figures bench_the_simulation(const std::string&, const BenchOptions& options) {
+Figures bench_the_simulation(const std::string&, const BenchOptions& options, const Show&) {
     return figures_of(bench_sim(options.sim, say));
 }
 
-Figures bench_the_tradeoff(const std::string&, const BenchOptions&) {
+Figures bench_the_tradeoff(const std::string&, const BenchOptions&, const Show&) {
     return figures_of(measure_tradeoff(all_tradeoff_settings(), kConverged, kFiner, say));
 }
 
-Figures bench_the_hard_scenes(const std::string&, const BenchOptions& options) {
-    return figures_of(bench_hard(options.hard, say));
+Figures bench_the_hard_scenes(const std::string&, const BenchOptions& options, const Show& show) {
+    HardBench all;
+    const std::vector<std::string>& chosen = options.hard.scenes;
+    for (const std::string& scene : kHardSceneNames) {
+        if (!chosen.empty() && std::ranges::find(chosen, scene) == chosen.end()) continue;
+        HardBenchOptions one = options.hard;
+        one.scenes = {scene};
+        HardBench found = bench_hard(one, say);
+        all.notes = std::exchange(found.notes, {});  // the same for all scenes
+        show(figures_of(found).text);
+        std::ranges::move(found.scenes, std::back_inserter(all.scenes));
+    }
+    Figures figures = figures_of(all);
+    figures.text = fmt::format("{}\n", fmt::join(all.notes, "\n"));
+    return figures;
 }
 
-Figures bench_the_workers(const std::string&, const BenchOptions& options) {
-    return figures_of(bench_workers(options.workers, say));
+Figures bench_the_workers(const std::string&, const BenchOptions& options, const Show& show) {
+    WorkersBench all;
+    for (const std::string& part : kWorkersBenchParts) {
+        WorkersBenchOptions one = options.workers;
+        if (!one.only.empty() && !one.only.contains(part)) continue;
+        one.only = {part};
+        WorkersBench found = bench_workers(one, say);
+        show(figures_of(found).text + '\n');
+        std::ranges::move(found.report.results, std::back_inserter(all.report.results));
+        for (const std::string& note : found.report.notes)
+            if (std::ranges::find(all.report.notes, note) == all.report.notes.end())
+                all.report.notes.push_back(note);
+        std::ranges::move(found.speed_ups, std::back_inserter(all.speed_ups));
+        std::ranges::move(found.bounds, std::back_inserter(all.bounds));
+        if (part == "migration") all.migration = std::move(found.migration);
+    }
+    Figures figures = figures_of(all);
+    figures.text.clear();
+    return figures;
 }
 
 /// What a program writes to its standard output, to its end.
@@ -96,7 +133,7 @@ std::string output_of(const std::vector<std::string>& command) {
 
 /// Runs a benchmark that lies beside what it measures: a program in the folder of this one which prints its
 /// figures, processor time by name, as Google Benchmark does.
-Figures run_bench_program(const std::string& bench, const BenchOptions&) {
+Figures run_bench_program(const std::string& bench, const BenchOptions&, const Show&) {
     const std::string name = "musicworld_" + bench + "_bench";
     const fs::path program = program_beside(name);
     if (!fs::exists(program))
@@ -116,19 +153,23 @@ Figures run_bench_program(const std::string& bench, const BenchOptions&) {
 }
 
 const std::vector<Bench> kBenches = {
-    {"tracking", {"bench.json"}, run_bench_program},
-    {"sim", {"bench.json"}, bench_the_simulation},
-    {"hard", {"bench.json", "hard.csv", "hard.svg", "hard.html"}, bench_the_hard_scenes},
-    {"workers", {"bench.json", "speed_up", "speed_up.csv", "bound.csv", "migration.svg"}, bench_the_workers},
-    {"render", {"bench.json"}, run_bench_program},
-    {"audio", {"bench.json"}, run_bench_program},
-    {"tradeoff", {"tradeoff.json", "tradeoff.csv", "tradeoff.svg"}, bench_the_tradeoff}};
+    {"tracking", "a minute", {"bench.json"}, run_bench_program},
+    {"sim", "10 minutes", {"bench.json"}, bench_the_simulation},
+    {"hard", "10 minutes", {"bench.json", "hard.csv", "hard.svg", "hard.html"}, bench_the_hard_scenes},
+    {"workers",
+     "10 minutes",
+     {"bench.json", "speed_up", "speed_up.csv", "bound.csv", "migration.svg"},
+     bench_the_workers},
+    {"render", "a minute", {"bench.json"}, run_bench_program},
+    {"audio", "a minute", {"bench.json"}, run_bench_program},
+    {"tradeoff", "10 minutes", {"tradeoff.json", "tradeoff.csv", "tradeoff.svg"}, bench_the_tradeoff}};
 
-Figures run_bench(const Bench& bench, const BenchOptions& options, const std::string& out) {
+Figures run_bench(const Bench& bench, const BenchOptions& options, const std::string& out, const Show& show) {
+    say(fmt::format("bench {}: all of it takes about {} on two cores", bench.name, bench.length));
     // Opened before the minutes of measuring, so that a place that cannot be written is known at once.
     std::optional<OutputFolder> folder;
     if (!out.empty()) folder.emplace(out, bench.products);
-    Figures figures = bench.measure(bench.name, options);
+    Figures figures = bench.measure(bench.name, options, show);
     if (!folder) return figures;
     write_file(folder->path(bench.products.front()), figures.json);
     for (const auto& [name, table] : figures.tables) write_file(folder->path(name), table);
@@ -154,24 +195,28 @@ void merge(Json& all, const Json& one) {
             all[key].insert(all[key].end(), value.begin(), value.end());
 }
 
-Figures bench_all(const BenchOptions& o) {
+Figures bench_all(const BenchOptions& o, const Show& show) {
     Json json;
-    Figures all;
     for (const Bench& bench : kBenches) {
-        say(bench.name);
-        const Figures one = run_bench(bench, o, o.out.empty() ? "" : (fs::path(o.out) / bench.name).string());
-        all.text += fmt::format("== {}\n{}\n", bench.name, one.text);
+        show(fmt::format("== {}\n", bench.name));
+        const Figures one =
+            run_bench(bench, o, o.out.empty() ? "" : (fs::path(o.out) / bench.name).string(), show);
+        show(one.text + '\n');
         merge(json, Json::parse(one.json));
     }
-    all.json = json_document(json);
-    return all;
+    return {"", json_document(json)};
 }
 
 void run_benches(BenchOptions& o) {
     o.workers.program = program_beside("musicworld").string();
     if (!o.scene.empty()) o.sim.scene = balls_of(o.scene);
     const auto bench = std::ranges::find(kBenches, o.name, &Bench::name);
-    const Figures figures = bench == kBenches.end() ? bench_all(o) : run_bench(*bench, o, o.out);
+    const Show show = [&o](const std::string& text) {
+        if (o.json) return;
+        fmt::print("{}", text);
+        std::fflush(stdout);
+    };
+    const Figures figures = bench == kBenches.end() ? bench_all(o, show) : run_bench(*bench, o, o.out, show);
     fmt::print("{}", o.json ? figures.json : figures.text);
 }
 

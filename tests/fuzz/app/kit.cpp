@@ -5,7 +5,7 @@
 #include "fuzz_target.h"
 #include "written_input.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_kit(std::string_view bytes) {
     static const WrittenInput input("fuzz.toml");
     try {
         (void)app::read_kit(input.with(bytes));

@@ -6,7 +6,7 @@
 #include "tracking/trace.h"
 #include "written_input.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_map(std::string_view bytes) {
     static const WrittenInput input("fuzz.toml");
     if (bytes.empty()) return;
     const bool is_experiment = bytes[0] == 'e';

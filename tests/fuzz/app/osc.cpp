@@ -24,7 +24,7 @@ std::unique_ptr<app::OscSource> make_source() {
 
 }  // namespace
 
-void fuzz(std::string_view bytes) {
+void fuzz_osc(std::string_view bytes) {
     static const std::unique_ptr<app::OscSource> source = make_source();
     source->datagram({bytes.data(), bytes.size()});
     for (app::SourceSample sample; source->next(sample, app::monotonic_ns()) == app::SourceStatus::sample;)

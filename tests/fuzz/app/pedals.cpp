@@ -5,7 +5,7 @@
 #include "files/bad_input.h"
 #include "fuzz_target.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_pedals(std::string_view bytes) {
     static const app::Kit kit = app::read_kit(app::find_kit("drums"));
     try {
         app::Pedals pedals(kit, 0);

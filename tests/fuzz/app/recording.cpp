@@ -23,7 +23,7 @@ void match(const std::filesystem::path& file) {
 
 }  // namespace
 
-void fuzz(std::string_view bytes) {
+void fuzz_recording(std::string_view bytes) {
     static const WrittenInput predictions("fuzz.csv"), trace("take.csv");
     if (bytes.empty()) return;
     const std::string_view rest = bytes.substr(1);

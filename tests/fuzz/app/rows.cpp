@@ -2,7 +2,7 @@
 #include "fuzz_target.h"
 #include "sensors/live_sources.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_rows(std::string_view bytes) {
     if (bytes.empty()) return;
     const auto cut = static_cast<unsigned char>(bytes[0]);
     bytes.remove_prefix(1);

@@ -2,7 +2,7 @@
 #include "fuzz_target.h"
 #include "region_text.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_drumgizmo(std::string_view bytes) {
     try {
         (void)audio::parse_drumgizmo(bytes, "fuzz");
     } catch (const audio::SampleError& fault) {

@@ -4,7 +4,7 @@
 #include "audio/midi_reader.h"
 #include "fuzz_target.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_midi(std::string_view bytes) {
     try {
         double before = 0;
         for (const audio::MidiMessage& message : audio::parse_midi(bytes, "fuzz")) {

@@ -7,7 +7,7 @@
 #include "audio/samples.h"
 #include "fuzz_target.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_own_orchestra(std::string_view bytes) {
     static const std::vector<std::string> kTaken = {"drum", "sample"};
     try {
         const std::string text = audio::checked_own_orchestra(bytes, "fuzz", kTaken);

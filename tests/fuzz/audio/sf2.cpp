@@ -2,7 +2,7 @@
 #include "fuzz_target.h"
 #include "region_text.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_sf2(std::string_view bytes) {
     try {
         (void)audio::parse_sf2(bytes, "fuzz");
     } catch (const audio::SampleError& fault) {

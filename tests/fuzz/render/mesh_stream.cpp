@@ -3,7 +3,7 @@
 
 #include "fuzz_target.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_mesh_stream(std::string_view bytes) {
     try {
         const std::string text(bytes);
         const render::Mesh mesh = render::decode_mesh_stream(text);

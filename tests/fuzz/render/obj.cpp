@@ -5,7 +5,7 @@
 #include "mesh_stream.h"
 #include "obj_reader.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_obj(std::string_view bytes) {
     try {
         const std::optional<render::Mesh> mesh = render::read_plain_obj("fuzz", bytes);
         if (!mesh) return;

@@ -18,7 +18,7 @@ void seal(std::vector<std::uint8_t>& bytes) {
 
 }  // namespace
 
-void fuzz(std::string_view text) {
+void fuzz_messages(std::string_view text) {
     std::vector<std::uint8_t> bytes(text.begin(), text.end());
     seal(bytes);
     try {

@@ -6,7 +6,7 @@
 
 namespace {
 
-tracking::ColumnMap map_of(unsigned char kind) {
+tracking::ColumnMap markers_of(unsigned char kind) {
     tracking::ColumnMap map;
     if (kind % 3 > 0) map.columns = {{"left.marker", "A"}, {"left.marker2", "B"}};
     if (kind % 3 > 1) map.columns.emplace("left.marker3", "C*");
@@ -15,11 +15,11 @@ tracking::ColumnMap map_of(unsigned char kind) {
 
 }  // namespace
 
-void fuzz(std::string_view bytes) {
+void fuzz_c3d(std::string_view bytes) {
     if (bytes.empty() || !tracking::is_c3d(bytes.substr(1))) return;
     try {
         const tracking::Trace trace =
-            tracking::read_markers(bytes.substr(1), "fuzz", map_of(static_cast<unsigned char>(bytes[0])));
+            tracking::read_markers(bytes.substr(1), "fuzz", markers_of(static_cast<unsigned char>(bytes[0])));
         require(!trace.sticks.empty(), "a trace without sticks");
         for (const tracking::StickTrace& stick : trace.sticks)
             for (const tracking::PoseSample& sample : stick.samples)

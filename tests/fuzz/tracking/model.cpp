@@ -27,7 +27,7 @@ std::string with_right_checksum(std::string text) {
 
 }  // namespace
 
-void fuzz(std::string_view bytes) {
+void fuzz_model(std::string_view bytes) {
     try {
         const std::string text = with_right_checksum(std::string(bytes));
         const tracking::PathModel model = tracking::parse_path_model(text, "fuzz");

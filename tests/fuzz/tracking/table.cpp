@@ -36,7 +36,7 @@ tracking::ColumnMap map_of(unsigned char kind) {
 
 }  // namespace
 
-void fuzz(std::string_view bytes) {
+void fuzz_table(std::string_view bytes) {
     if (bytes.empty()) return;
     try {
         const tracking::Trace trace = tracking::read_tables({{std::string(bytes.substr(1)), "fuzz"}},

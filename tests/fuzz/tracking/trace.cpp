@@ -5,7 +5,7 @@
 
 #include "fuzz_target.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_trace(std::string_view bytes) {
     try {
         const tracking::Trace trace = tracking::parse_trace(bytes, "fuzz");
         require(!trace.sticks.empty(), "a trace without sticks");

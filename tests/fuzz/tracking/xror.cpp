@@ -4,7 +4,7 @@
 #include "fuzz_target.h"
 #include "tracking/trace.h"
 
-void fuzz(std::string_view bytes) {
+void fuzz_xror(std::string_view bytes) {
     if (bytes.size() < 5 || bytes[4] == 't' || bytes[4] == '#') return;  // a native trace, perhaps
     try {
         const tracking::Trace trace = tracking::parse_trace(bytes, "fuzz");
