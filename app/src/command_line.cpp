@@ -47,9 +47,8 @@ std::string instead_of(const std::string& command, const std::string& option) {
     const std::string name = option.substr(0, option.find('='));
     if (command != "musicworld simulate" || (name != "--mode" && name != "--verify")) return {};
     return fmt::format(
-        "{} is gone: workers are always out of step by at most --bound steps; --bound 0 is a barrier after "
-        "each "
-        "step; for the bits of one process use --workers 0 with --threads N",
+        "found {}, which is gone, expected --bound B: workers are always out of step by at most B steps, "
+        "and 0 is a barrier after each step; for the bits of one process use --workers 0 with --threads N",
         name);
 }
 
