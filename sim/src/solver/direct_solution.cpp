@@ -11,24 +11,42 @@
 namespace sim {
 namespace {
 
-// Multiply-adds per body, see most_with_contacts and most_with_springs.
+// Constants: value; unit; why; what breaks without it.
+// [multiply-adds a body] Up to which an island is solved directly: of contacts alone, where sweeps would do, and with springs.
+// More: piles cost many times their sweeps.
 constexpr double kMostWithContacts = 500, kMostWithSprings = 1e4;
-constexpr double kFirm = 1e-9;   // least compliance of a spring, share of the bodies' own
-constexpr double kSoft = 3e-4;   // compliance of an overlap over a substep, share of the bodies' own, at most
-// At which an overlap carries its load of the substep before, share of the bodies' size.
+// [bodies' mobility] Least compliance of a spring: what is called rigid. Less: the factorisation loses its digits.
+constexpr double kFirm = 1e-9;
+// [bodies' mobility] Compliance of an overlap over a substep at most. Less: how a load is shared out by four corners is not
+// defined; more: stacks sway.
+constexpr double kSoft = 3e-4;
+// [smaller half extent] Overlap at which a contact carries its load of the substep before: it is harder under heavy loads.
+// Without: high stacks sink.
 constexpr double kOverlap = 1e-4;
-// An overlap's least compliance, well above that of springs, so that loads stay finite where these hold bodies inside each other.
+// [bodies' mobility] An overlap's least compliance, well above that of springs: loads stay finite where these hold bodies inside
+// each other.
 constexpr double kHardest = 1e-5;
-constexpr double kHeld = 1e-2, kHeldAlong = 0.1;  // of a contact's impulse to the round before's; friction's
-constexpr double kCorrected = 0.2;                // share of an overlap that a substep takes back
-constexpr int kMostTurns = 12;                    // of the ends' Newton iteration
-constexpr double kResolved = 0.25;                // h^2 k / m of a spring up to which its motion is followed
-constexpr double kSoftSpring = 0.05, kMostDamped = 0.5;  // see acts_as_force
-constexpr double kEndTolerance = 1e-8;                   // of a gap, share of a body's size
-constexpr double kMostFall = 1.2e-3;                     // in a substep, share of a body's size
-constexpr int kMostFallLevel = 6;                        // for that a substep is halved so often at most
-constexpr double kFree = 1e6;                            // of a speed: no contact holds it [m/s]
-constexpr double kMostTurn = 0.04;                       // of a spring's arm in a substep [rad]
+// [bodies' mobility] Compliance by which a contact's impulse is held to the round before's; along, friction's.
+constexpr double kHeld = 1e-2, kHeldAlong = 0.1;
+// Share of an overlap that a substep takes back. More: loads are shared out anew at every step, and stacks simmer.
+constexpr double kCorrected = 0.2;
+// Newton's iterations on the ends' poses; where they do not suffice the substep is halved.
+constexpr int kMostTurns = 12;
+// h^2 k / m of a spring up to which its motion is followed (trapezoidal rule); stiffer ones hold. More: they ring undamped.
+constexpr double kResolved = 0.25;
+// h^2 k / m, and share of the ends' speed that damping takes, up to which a spring is a force. More: velocity Verlet is unstable
+// from 4 on, and wrong long before.
+constexpr double kSoftSpring = 0.05, kMostDamped = 0.5;
+// [half extent] Gap of a spring's ends that is good enough. Larger: chains of stiff springs gain energy.
+constexpr double kEndTolerance = 1e-8;
+// [half extent] By which weight may move a body in a substep, and how often a substep is halved for that. Without: stacks of small
+// boxes sway and fall.
+constexpr double kMostFall = 1.2e-3;
+constexpr int kMostFallLevel = 6;
+// [m/s] A speed that no contact holds.
+constexpr double kFree = 1e6;
+// [rad] By which a spring's arm may turn in a substep: its energy is off by t^2 / 12 of itself. More: pendulums gain.
+constexpr double kMostTurn = 0.04;
 
 // Over the first half of a substep's impulses modes yield as they will to the whole, that is to twice as much.
 double mode_scale(bool positions) noexcept {

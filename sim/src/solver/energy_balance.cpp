@@ -5,7 +5,9 @@
 namespace sim {
 namespace {
 
-constexpr double kMostGained = 1e-7;  // energy in a step, of the motion's and of weight times size
+// [energy of motion and of weight times size] An island's gain in a step that is rounding. More: heaps creep and simmer; less:
+// rounding is taken for a gain, and free motion is braked.
+constexpr double kMostGained = 1e-7;
 
 }  // namespace
 

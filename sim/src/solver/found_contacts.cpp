@@ -6,8 +6,8 @@
 namespace sim {
 namespace {
 
-constexpr std::size_t kMostFollowed =
-    64;  // bodies of an island that is followed: all are solved in each halving
+// [bodies] Of an island that is followed: all are solved in each halving, so larger ones take long.
+constexpr std::size_t kMostFollowed = 64;
 
 }  // namespace
 

@@ -4,7 +4,8 @@
 
 namespace sim {
 
-constexpr int kMostFollowLevel = 8;  ///< so often at most a substep is halved for bodies that are followed
+/// Times that a substep is halved at most for bodies that are followed: some 1e-4 of a usual step.
+constexpr int kMostFollowLevel = 8;
 
 /// Contacts of an island found again within a step, where its bodies have moved by more than kSlow of their size since they were
 /// found: the step goes on as a new one would begin.

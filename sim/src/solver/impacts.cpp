@@ -12,17 +12,26 @@
 namespace sim {
 namespace {
 
-// Of the smaller half extent: by so much surfaces that turn may leave the straight way in what is left of the step, and those of
-// bodies with modes slide.
+// Constants: value; unit; why; what breaks without it.
+// [smaller half extent] Surfaces that turn, or slide with modes, by more in what is left of the step are no standing contact after
+// the impact. Without: a spinning box is held by a plane that its corner has long left.
 constexpr double kStandsStill = 0.1;
-constexpr double kTouches = 1e-3;   // of the smaller half extent: gap of what takes part in an impact
-constexpr int kImpactSweeps = 30;   // of a reflection, at most
-constexpr float kSettled = 1e-6f;   // change of impulses in a sweep, share
-constexpr int kPasses = 8;          // over a substep's impacts: of what rattles the rest does not rebound
-constexpr int kStrikeLevel = 2;     // so often a substep is halved for an impact, directly
-constexpr int kReflections = 200;   // of an impact
-constexpr float kRounding = 1e-6f;  // of speeds
-constexpr float kSlowest = 1e-4f;   // approach that is reflected, of the impact's first
+// [smaller half extent] Gap of what takes part in an impact of others. Without: rounding parts a row of balls that touch.
+constexpr double kTouches = 1e-3;
+// Sweeps of a reflection at most, and change of impulses in one, as a share, at which it is settled. Without: a long row costs more
+// than its bodies' whole step; unsettled, momentum arrives at the wrong ball.
+constexpr int kImpactSweeps = 30;
+constexpr float kSettled = 1e-6f;
+// Reflections of one impact. What rattles between walls would never end.
+constexpr int kReflections = 200;
+// Passes over a substep's impacts; of what rattles on, the rest does not rebound in this substep.
+constexpr int kPasses = 8;
+// Times that a substep is halved for an impact, in direct solutions. Without: a rebound acts up to a substep early.
+constexpr int kStrikeLevel = 2;
+// Rounding of speeds, share; and the slowest approach that is reflected, share of the impact's first. Without: bodies that part
+// rebound from noise, for ever.
+constexpr float kRounding = 1e-6f;
+constexpr float kSlowest = 1e-4f;
 
 double smallest_half(const BodyKind& kind) {
     return kind.definition.shape.base.semi_axes.minCoeff();

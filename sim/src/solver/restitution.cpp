@@ -7,8 +7,13 @@
 namespace sim {
 namespace {
 
-// Slower approaches may be those of what rests [m/s]. Without it, bodies at rest under heavy gravity or long steps would rebound.
+// Constants: value; unit; why; what breaks without it.
+// [m/s] Slower approaches may be those of what rests, so they never rebound, whatever the step. Without: in long steps or under a
+// heavy pull the limit by weight alone would stop all slow rebounds.
 constexpr double kFastestRest = 0.1;
+// Substeps in which weight may bring a resting body to the speed at which it does not rebound yet. Without: what rests on
+// something that gives way hops.
+constexpr double kRestSubsteps = 4;
 
 }  // namespace
 
@@ -17,7 +22,7 @@ float least_bounce(const IslandRows& rows, const ContactRows& c) {
     const Eigen::Vector3d& g = rows.settings.gravity;
     const double h = rows.settings.dt / rows.settings.substeps,
                  along = std::abs(g.dot(c.point->normal.cast<double>())) + 0.1 * g.norm();
-    return static_cast<float>(std::min(kFastestRest, 4 * h * along));
+    return static_cast<float>(std::min(kFastestRest, kRestSubsteps * h * along));
 }
 
 // The speed that an impact leaves: e times the approach; of bodies with modes, what leaves e^2 of the energy that stopping
