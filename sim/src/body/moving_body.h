@@ -11,7 +11,7 @@ struct MovingBody {
     // What every pass over all bodies asks for comes first, in one line of the cache.
     const BodyKind* kind = nullptr;
     bool fixed = false, quarantined = false, asleep = false;
-    bool travels = false;  ///< by `motion`, in this step
+    bool driven = false;   ///< by `motion`, in this step
     bool own = true;       ///< stepped here; else a copy of another world's body
     bool unposed = false;  ///< `posed` is older than `state`
     bool pushed = false;   ///< forces act in the next step: the user's, or of bodies elsewhere

@@ -23,7 +23,7 @@ private:
 /// Waits for what another thread does in less time than a sleep takes: a few microseconds awake, then letting others run.
 class ShortWait {
 public:
-    /// Once more; false: it takes longer.
+    /// Waits for a moment; false: it has waited for long by now.
     bool again() noexcept;
 
 private:

@@ -8,7 +8,7 @@ const PosedBody& IslandContacts::posed(const ContactScene& scene, int id) {
     const auto at = std::lower_bound(ids_->begin(), ids_->end(), id);
     if (at != ids_->end() && *at == id) return posed_[static_cast<std::size_t>(at - ids_->begin())];
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
-    if (!body.travels) return body.posed;
+    if (!body.driven) return body.posed;
     const BodyPath::Pose pose = (*paths_)[static_cast<std::size_t>(id)].at(time_);
     driven_.kind = body.kind;
     driven_.set(pose.position, pose.orientation, body.state.q);

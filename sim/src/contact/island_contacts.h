@@ -18,7 +18,8 @@ public:
               double time, std::vector<Manifold>& manifolds);
 
 private:
-    const PosedBody& posed(const ContactScene& scene, int id);  // now; one that travels till the next call
+    const PosedBody& posed(const ContactScene& scene,
+                           int id);  // now; one of a prescribed motion till the next call
     void list_keys(const ContactScene& scene);
     void find_pair(const ContactScene& scene, const Manifold* before, Manifold& manifold);
 

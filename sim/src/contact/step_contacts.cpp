@@ -73,7 +73,7 @@ double turning_speed(const MovingBody& body) noexcept {
 
 double contact_reach(const MovingBody& body, const WorldSettings& settings) {
     const double slop = kSlop * smallest_half(body);
-    if (body.travels) return slop + settings.dt * point_speed(body);
+    if (body.driven) return slop + settings.dt * point_speed(body);
     if (!body.moves() || body.asleep) return slop;
     return slop + settings.dt * (point_speed(body) + settings.dt * pull_on(body, settings).norm());
 }
@@ -112,7 +112,7 @@ void StepContacts::set_reach(const ContactScene& scene, int id) {
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
     Reach& reach = reach_[static_cast<std::size_t>(id)];
     reach = {};
-    if (body.travels) {
+    if (body.driven) {
         const BodyPath& path = paths_[static_cast<std::size_t>(id)];
         reach.moved = path.until(path.end).moved;
         reach.rung = -reach.moved.norm();  // by how much its way is longer
@@ -131,24 +131,24 @@ void StepContacts::set_reach(const ContactScene& scene, int id) {
 }
 
 void StepContacts::set_box(const ContactScene& scene, std::size_t i) {
-    const int id = scene.here[i];
+    const int id = scene.participants[i];
     const MovingBody& body = scene.bodies[static_cast<std::size_t>(id)];
     const Reach& reach = reach_[static_cast<std::size_t>(id)];
     const Eigen::Vector3d half =
         body.posed.half_aabb.array() + reach.turned + reach.rung + kSlop * smallest_half(body);
     const Eigen::Vector3d &from = body.posed.position, to = from + reach.moved;
     broad_.boxes()[i] = {from.cwiseMin(to) - half, from.cwiseMax(to) + half, id,
-                         body.travels || (body.moves() && !body.asleep)};
+                         body.driven || (body.moves() && !body.asleep)};
 }
 
 bool StepContacts::find_once(const ContactScene& scene) {
     meetings_.clear();
     followed_.assign(scene.bodies.size(), kNotFollowed);
     watched_.assign(scene.bodies.size(), 0);
-    const std::size_t count = scene.here.size();
+    const std::size_t count = scene.participants.size();
     broad_.boxes().resize(count);
     scene.crew.each(count, 64, [&](int, std::size_t first, std::size_t last) {
-        for (std::size_t i = first; i < last; ++i) set_reach(scene, scene.here[i]), set_box(scene, i);
+        for (std::size_t i = first; i < last; ++i) set_reach(scene, scene.participants[i]), set_box(scene, i);
     });
     const auto& pairs = broad_.find(scene.crew);
     const std::size_t most = scene.crew.size() == 1 ? 1 : 16 * static_cast<std::size_t>(scene.crew.size());
@@ -174,12 +174,12 @@ void StepContacts::find(const ContactScene& scene, const std::vector<std::pair<i
     found.manifolds.clear(), found.meetings.clear(), found.woken.clear();
     found.pairs = 0;
     if (found.first == found.last) return;
-    const int first = scene.here[found.first];
+    const int first = scene.participants[found.first];
     const auto first_before = std::ranges::lower_bound(before_, first, {}, &Manifold::a);
     found.next_before = static_cast<std::size_t>(first_before - before_.begin());
     auto pair = std::ranges::lower_bound(pairs, first, {}, &std::pair<int, int>::first);
     for (std::size_t k = found.first; k < found.last; ++k) {
-        const int i = scene.here[k];
+        const int i = scene.participants[k];
         for (; pair != pairs.end() && pair->first == i; ++pair)
             if (scene.may_meet(*pair)) meet_pair(scene, i, pair->second, found);
         meet_planes(scene, i, found);
@@ -297,7 +297,7 @@ double StepContacts::bulge(const ContactScene& scene, int id) const {
     const double reach = turn_reach_of(*body.kind);
     double turned = reach_[static_cast<std::size_t>(id)].turned;
     if (!(turned > 0) || !(reach > 0)) return 0;
-    if (!body.travels)  // closer than that bound
+    if (!body.driven)  // closer than that bound
         turned = scene.settings.dt * reach *
                  spin_of(body, body.state.orientation, body.state.angular_momentum).norm();
     return turned * turned / (2 * reach);

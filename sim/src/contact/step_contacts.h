@@ -18,7 +18,7 @@ struct ContactScene {
     const std::vector<WorldPlane>& planes;
     const std::vector<std::pair<int, int>>& joined;  ///< pairs (a < b, ascending) that do not collide
     std::vector<MovingBody>& bodies;
-    const std::vector<int>& here;  ///< ids of those that take part, ascending
+    const std::vector<int>& participants;  ///< ids of those that take part, ascending
     /// No pairs of two foreign bodies that move.
     bool among_ghosts;
     Crew& crew;  ///< shares the work

@@ -62,7 +62,7 @@ void StepContacts::rewarm(Manifold& manifold) {
 
 void StepContacts::follow(const ContactScene& scene, int i, const WorldBodyState& from) {
     const auto at = static_cast<std::size_t>(i);
-    if (scene.bodies[at].travels) return;
+    if (scene.bodies[at].driven) return;
     // Once, whichever thread asks first.
     const std::atomic_ref<std::uint8_t> state(followed_[at]);
     std::uint8_t now = kNotFollowed;
@@ -208,7 +208,7 @@ bool StepContacts::left_path(const ContactScene& scene, int i) const {
 }
 
 bool StepContacts::any_left_path(const ContactScene& scene, const std::vector<std::uint8_t>& solved) const {
-    return std::ranges::any_of(scene.here, [&](int id) {
+    return std::ranges::any_of(scene.participants, [&](int id) {
         return solved[static_cast<std::size_t>(id)] != 0 && left_path(scene, id);
     });
 }
@@ -221,7 +221,7 @@ const std::vector<StepContacts::Meeting>& StepContacts::unforeseen(
     if (!any_left_path(scene, solved)) return meetings_;
     auto& boxes = broad_.boxes();
     boxes.clear();
-    for (const int id : scene.here) {
+    for (const int id : scene.participants) {
         const auto at = static_cast<std::size_t>(id);
         const MovingBody& body = scene.bodies[at];
         const bool left = solved[at] != 0 && left_path(scene, id);

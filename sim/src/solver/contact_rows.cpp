@@ -155,8 +155,8 @@ void IslandRows::write_contact(ContactRows& c) {
 // What the rows of a contact see of bodies that move as prescribed.
 void IslandRows::see_driven(ContactRows& c) const {
     const int a = c.manifold->a, b = c.manifold->b;
-    const bool any = world[static_cast<std::size_t>(a)].travels ||
-                     (b < kFirstPlane && world[static_cast<std::size_t>(b)].travels);
+    const bool any = world[static_cast<std::size_t>(a)].driven ||
+                     (b < kFirstPlane && world[static_cast<std::size_t>(b)].driven);
     if (!any) return;
     const Eigen::Vector3d place = place_now(c);
     const int driven = c.side[0].body < 0 ? a : b;

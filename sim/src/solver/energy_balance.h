@@ -26,8 +26,8 @@ public:
     /// Bodies that only contacts and joints hold have no more energy after a step than before it: contacts that are found anew, and
     /// overlaps that are taken back, would give some at each step, and what leans would start to slide. What they got beyond
     /// kMostGained is taken from their motion against the rigid motion of them all, so that linear and angular momentum are kept;
-    /// where that is not enough, it came from outside, and is taken from all of it. Not of bodies that others compute, too, at
-    /// their own pace: what they were told stands.
+    /// where that is not enough, it came from outside, and is taken from all of it. Not called for islands with
+    /// ghosts: their owners compute these bodies, too.
     void take_gain(double energy_now);
 
 private:

@@ -20,7 +20,7 @@ IslandRows::End IslandRows::end_of(int body, const Eigen::Vector3d& rest, float*
     if (body < 0) return {rest, {-1, Eigen::Vector3f::Zero(), nullptr}};
     const MovingBody& b = world[static_cast<std::size_t>(body)];
     const BodyKind& kind = *b.kind;
-    if (b.travels) {
+    if (b.driven) {
         const BodyPath::Pose pose = pose_of(body, substep.now);
         const Eigen::Vector3d arm = pose.orientation * rest;
         return {pose.position + arm, {-1, arm.cast<float>(), nullptr}};
@@ -47,7 +47,7 @@ IslandRows::End IslandRows::end_of(int body, const Eigen::Vector3d& rest, float*
 Eigen::Quaterniond IslandRows::orientation_of(int body) const {
     if (body < 0) return Eigen::Quaterniond::Identity();
     const MovingBody& b = world[static_cast<std::size_t>(body)];
-    return b.travels ? pose_of(body, substep.now).orientation : b.state.orientation;
+    return b.driven ? pose_of(body, substep.now).orientation : b.state.orientation;
 }
 
 // Springs act over large turns, so their arms and rows follow the bodies every substep.
@@ -73,30 +73,30 @@ void IslandRows::write_spring(SpringRows& s) {
 }
 
 bool IslandRows::is_carried(const Island& of) const {
-    auto travels = [this](int id) {
-        return id >= 0 && id < kFirstPlane && world[static_cast<std::size_t>(id)].travels;
+    auto driven = [this](int id) {
+        return id >= 0 && id < kFirstPlane && world[static_cast<std::size_t>(id)].driven;
     };
     return std::ranges::any_of(of.manifolds,
                                [&](int m) {
                                    const Manifold& manifold = manifolds[static_cast<std::size_t>(m)];
-                                   return travels(manifold.a) || travels(manifold.b);
+                                   return driven(manifold.a) || driven(manifold.b);
                                }) ||
            std::ranges::any_of(of.constraints, [&](int c) {
                const PointConstraint& held = constraints[static_cast<std::size_t>(c)].definition;
-               return travels(held.body_a) || travels(held.body_b);
+               return driven(held.body_a) || driven(held.body_b);
            });
 }
 
 // Where a body that the island does not move is, and how.
 BodyPath::Pose IslandRows::pose_of(int body, double time) const {
     const MovingBody& b = world[static_cast<std::size_t>(body)];
-    if (b.travels) return paths[static_cast<std::size_t>(body)].at(time);
+    if (b.driven) return paths[static_cast<std::size_t>(body)].at(time);
     return {b.state.position, b.state.orientation};
 }
 
 // Speed of its matter at a place, mean over the substep.
 Eigen::Vector3d IslandRows::speed_of(int body, const Eigen::Vector3d& arm) const {
-    if (body < 0 || body >= kFirstPlane || !world[static_cast<std::size_t>(body)].travels)
+    if (body < 0 || body >= kFirstPlane || !world[static_cast<std::size_t>(body)].driven)
         return Eigen::Vector3d::Zero();
     const BodyPath::Pose from = pose_of(body, substep.begins), to = pose_of(body, substep.begins + substep.h);
     const Eigen::AngleAxisd turn(to.orientation * from.orientation.conjugate());

@@ -31,7 +31,7 @@ void World::Implementation::begin_motions() {
         follow_motion(body.motion, begins, settings.dt, path);
         const BodyPath::Leg& first = path.legs.front();
         set_driven(body, {{first.position, first.orientation}, first.velocity, first.spin});
-        body.travels = std::ranges::any_of(path.legs, [](const BodyPath::Leg& leg) {
+        body.driven = std::ranges::any_of(path.legs, [](const BodyPath::Leg& leg) {
             return !leg.velocity.isZero(0) || !leg.spin.isZero(0);
         });
     }
@@ -39,7 +39,7 @@ void World::Implementation::begin_motions() {
         const int a = c.definition.body_a, b = c.definition.body_b;
         if (!c.holds || b < 0) continue;
         for (const auto& [one, other] : {std::pair(a, b), std::pair(b, a)})
-            if (bodies[static_cast<std::size_t>(one)].travels &&
+            if (bodies[static_cast<std::size_t>(one)].driven &&
                 bodies[static_cast<std::size_t>(other)].asleep)
                 wake_group(bodies, other);
     }

@@ -18,11 +18,11 @@ void push(MovingBody& body, double dt, const StepImpulse& impulse) {
 
 }  // namespace
 
-void World::Implementation::gather_pairs() {
+void World::Implementation::gather_shared() {
     std::sort(placed.begin(), placed.end());
-    here.clear();
-    std::merge(owned.begin(), owned.end(), placed.begin(), placed.end(), std::back_inserter(here));
-    std::erase_if(here, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
+    participants.clear();
+    std::merge(owned.begin(), owned.end(), placed.begin(), placed.end(), std::back_inserter(participants));
+    std::erase_if(participants, [this](int i) { return bodies[static_cast<std::size_t>(i)].quarantined; });
 }
 
 void World::Implementation::dismiss_ghosts() {
@@ -100,7 +100,7 @@ double SharedWorld::radius_now(int body) const {
 }
 
 bool World::Implementation::near_own(const Eigen::Vector3d& center, double radius) const {
-    return std::any_of(own_balls.begin(), own_balls.end(), [&](const LooseBall& ball) {
+    return std::any_of(own_balls.begin(), own_balls.end(), [&](const Ball& ball) {
         const double reach = ball.radius + radius;
         return (ball.center - center).squaredNorm() <= reach * reach;
     });

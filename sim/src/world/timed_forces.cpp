@@ -16,7 +16,6 @@ int body_of(const ActiveForce& active) {
 
 }  // namespace
 
-// Those that act within the step that begins, and wakes their bodies.
 void World::Implementation::find_forces() {
     active.clear();
     const double substep = settings.dt / settings.substeps;

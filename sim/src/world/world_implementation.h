@@ -12,125 +12,141 @@
 
 namespace sim {
 
-constexpr double kWorkOfPair = 0.5, kWorkOfPoint = 0.75;  ///< of a body that touches nothing
-constexpr std::size_t kBodiesAPiece = 32;                 ///< of what threads take at once
+constexpr std::size_t kBodiesAPiece = 32;  ///< bodies that a thread takes at once: some microseconds of work
 
-/// What world.cpp (one world's step) and world_sharing.cpp (several worlds of the same bodies) work on.
+/// A world and the stages of its step, in the order of step(). One source for each group below.
 struct World::Implementation {
+    // What is in it; world.cpp.
     WorldSettings settings;
     std::vector<WorldPlane> planes;
     std::vector<WorldBody> definitions;
     std::vector<std::unique_ptr<BodyKind>> kinds;
     std::vector<MovingBody> bodies;
     std::vector<HeldConstraint> constraints;
-    std::vector<TimedForce> forces;           // ascending by bodies
-    std::vector<ActiveForce> active;          // of them in the step, ascending by bodies
-    std::vector<std::pair<int, int>> joined;  // pairs that a constraint joins and that do not collide
+    std::vector<std::pair<int, int>>
+        joined;                      ///< pairs that a constraint joins and that do not collide, ascending
+    std::vector<TimedForce> forces;  ///< ascending by bodies
+    WorldCounts counts;
+    Eigen::Vector3d outside = Eigen::Vector3d::Zero();  ///< see World::outside_impulse
+
+    int add(const WorldBody& body);  ///< returns its id
+    const BodyKind* kind_of(const WorldBody& body);
+    void set_joined();
+    void pose(MovingBody& body);  ///< its shape and place for contact tests
+    void make_solvers();          ///< one a thread
+
+    // A step; world_step.cpp.
+    std::vector<int> participants;  ///< bodies that take part in the step, ascending
     StepContacts contacts;
-    std::vector<std::unique_ptr<IslandSolver>> solvers;     // one a thread
-    std::unique_ptr<Crew> crew = std::make_unique<Crew>();  ///< who shares the work of a step
-    Crew alone;
-    [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
-    void make_solvers();  ///< one a thread
-    std::vector<Island> islands;
-    DisjointSets sets;                          ///< of bodies that contacts and constraints join
-    std::vector<int> place;                     ///< of a set's first body: the island
-    std::vector<std::pair<int, int>> touching;  // of each contact: bodies that move, or -1
+    Eigen::Vector3d outside_before = Eigen::Vector3d::Zero();  ///< `outside`, when the step began
+
+    void step();
+    void begin_step();  ///< motions, forces, participants
+    void end_step();
+    void gather();  ///< fills `participants`
+    [[nodiscard]] bool any_awake() const;
+    void pose_bodies();
+    void list_broken();   ///< constraints that broke in the step
+    void list_limited();  ///< bodies whose deformation was held in the step
+    void count_work();    ///< see SharedWorld::work, and counts
+
+    // Bodies whose state is not finite; world_step.cpp.
+    std::vector<QuarantinedBody> quarantined;
+    std::vector<FirstStep> limited, broken;
+    bool all_whole = false;  ///< no own body is broken: nothing has changed them since that was checked
+
+    void quarantine_broken();                            ///< before a step, before they touch others
+    void quarantine_results();                           ///< after a step, before any reader sees them
+    void quarantine(int body, const std::string& what);  ///< takes it out of the world
+    void drop_constraints(int body);                     ///< of a body that is taken out
+    template <typename Concerned>
+    [[nodiscard]] bool any_broken(Concerned concerned);
+
+    // Prescribed motions and timed forces; driven_bodies.cpp, timed_forces.cpp.
+    std::vector<ActiveForce> active;  ///< forces that act within the step, ascending by bodies
+
+    void begin_motions();
+    void end_motions();
+    void place_driven(MovingBody& body);
+    void set_driven(MovingBody& body, const PrescribedState& now);
+    void find_forces();  ///< fills `active`, and wakes their bodies
+    [[nodiscard]] bool is_forced(int body) const;
+
+    // Islands and sleep; world_islands.cpp.
+    std::vector<Island> islands;  ///< the first `islands_used` count
     std::size_t islands_used = 0;
-    /// What a solve changed besides the bodies' states, kept of every island at its first body.
+    DisjointSets sets;                          ///< of bodies that contacts and constraints join
+    std::vector<int> place;                     ///< of a set's first body: its place among the islands
+    std::vector<std::pair<int, int>> touching;  ///< of each contact: its bodies that move, or -1
+
+    void find_islands();
+    [[nodiscard]] bool is_own(const Island& island) const;   ///< has an own body
+    [[nodiscard]] bool is_held(const Island& island) const;  ///< something that does not move holds it
+    [[nodiscard]] bool drifts(const Island& island) const;   ///< it goes on, or would fall
+    [[nodiscard]] int still_steps_to_sleep() const;
+    void put_to_sleep();
+
+    // Solving islands, again where bodies met unforeseen; solve_islands.cpp.
+    using Solve = std::function<void(const Island&, IslandSolver&, const ContactScene&)>;
+    /// What solving an island changed besides the bodies' states; kept at its first body.
     struct Outcome {
         Eigen::Vector3d outside = Eigen::Vector3d::Zero();
         std::uint64_t limited = 0, broken = 0;
-        bool carried = false;             // IslandSolver::is_carried
-        bool found = false;               // contacts, within the step
-        std::vector<Manifold> manifolds;  // those
+        bool carried = false;             ///< it touches what moves as prescribed
+        bool found = false;               ///< contacts were found again within the step:
+        std::vector<Manifold> manifolds;  ///< those
     };
-    std::vector<Outcome> outcomes;
-    std::vector<WorldBodyState> started;        // of bodies that are solved, when the step began
-    std::vector<std::uint8_t> at_limit_before;  // at_limit of bodies, then
-    std::vector<SpringRecord> springs_before;   // then
-    std::vector<std::uint8_t> solved,
-        again;  // of each body: its island went through the solver, and has to once more
-    WorldCounts counts;
-    std::vector<QuarantinedBody> quarantined;
-    std::vector<FirstStep> limited, broken;
-    Eigen::Vector3d outside = Eigen::Vector3d::Zero();         // impulse, see World::outside_impulse
-    Eigen::Vector3d outside_before = Eigen::Vector3d::Zero();  // when the last step began
+    std::unique_ptr<Crew> crew = std::make_unique<Crew>();  ///< threads that share the work of a step
+    Crew alone;
+    std::vector<std::unique_ptr<IslandSolver>> solvers;  ///< one a thread
+    std::vector<Outcome> outcomes;                       ///< of each body
+    std::vector<const Island*> to_solve, small;          ///< in this round; of them, for one thread each
+    std::vector<std::uint8_t> solved, again;  ///< of each body: its island was solved; has to be once more
+    bool solving = false;                     ///< the step has come so far, and the following hold:
+    std::vector<WorldBodyState> started;      ///< states when the step began, of bodies that are solved
+    std::vector<std::uint8_t> at_limit_before;
+    std::vector<SpringRecord> springs_before;
+    std::vector<StepContacts::Meeting> last;  ///< what meets after all rounds
 
-    std::vector<int> here;  // bodies that take part in the step, ascending
+    [[nodiscard]] IslandSolver& solver() const noexcept { return *solvers.front(); }
+    [[nodiscard]] ContactScene contact_scene(Crew& by);
+    void solve_islands();
+    void start_solving();
+    void share_islands(const Solve& solve);  ///< calls solve(island, solver, scene) for those in `to_solve`
+    [[nodiscard]] bool is_by_one(const Island& island) const;  ///< thread
+    void solve_island(const Island& island, bool follow, IslandSolver& by, const ContactScene& scene);
+    void move_alone(int body);
+    void note_found();
+    void solve_again();
+    void begin_again(const Island& island);
+    void hold_apart(const StepContacts::Meeting& meeting);
+    void sum_outcomes();
 
-    using Solve = std::function<void(const Island&, IslandSolver&, const ContactScene&)>;
-    bool solving = false;    ///< the step has come so far
-    bool all_whole = false;  ///< no own body is broken: nothing has changed them since that was seen
-    // Sharing.
-    bool shared = false;       ///< see SharedWorld
-    std::vector<int> owned;    // pairs: own and fixed bodies, ascending
-    std::vector<int> placed;   // pairs: ghosts of the next step
-    std::vector<int> arrived;  // bodies that are own since the last step
-    int cross_contacts = 0;
-    struct LooseBall {
-        Eigen::Vector3d center;
-        double radius;
-    };
-    std::vector<LooseBall> own_balls;  // pairs: of the next step
-    [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius) const;
-
-    const BodyKind* kind_of(const WorldBody& body);
-    int add(const WorldBody& body);   ///< returns its id
-    void set_joined();                ///< by constraints
-    void drop_constraints(int body);  ///< of a body that is taken out
+    // State taken and taken back to; world_snapshot.cpp.
     void record(int body, WorldRecord& out) const;
     void restore(const WorldRecord& record);
     void restore(const std::vector<SpringRecord>& springs);
-    void set_step(std::uint64_t step);
     [[nodiscard]] SpringRecord spring_record(std::size_t constraint) const;
-    bool restore_spring(const SpringRecord& record);     ///< whether it held otherwise
-    void pose(MovingBody& body);                         ///< for contact tests
-    void quarantine(int body, const std::string& what);  ///< takes it out of the world
-    template <typename Concerned>
-    [[nodiscard]] bool any_broken(Concerned concerned);     ///< of those here
-    void quarantine_broken();                               ///< before the step
-    void quarantine_results();                              ///< after the step
-    [[nodiscard]] bool is_own(const Island& island) const;  ///< has an own body
-    [[nodiscard]] bool any_awake() const;
-    void place_driven(MovingBody& body);
-    void set_driven(MovingBody& body, const PrescribedState& now);
-    void begin_motions();
-    void end_motions();
-    void find_forces();  // and who they wake
-    [[nodiscard]] bool is_forced(int body) const;
-    void gather();        // who takes part in the step
-    void list_owned();    ///< fills `owned`
-    void gather_pairs();  // own bodies and the ghosts that were placed
+    bool restore_spring(const SpringRecord& record);  ///< whether it held otherwise
+    void set_step(std::uint64_t step);
+
+    // A world that is shared; shared_world.cpp.
+    struct Ball {
+        Eigen::Vector3d center;
+        double radius;
+    };
+    bool shared = false;          ///< see SharedWorld
+    std::vector<int> owned;       ///< own and fixed bodies, ascending
+    std::vector<int> placed;      ///< ghosts of the next step
+    std::vector<int> arrived;     ///< bodies that became own since the last step
+    std::vector<Ball> own_balls;  ///< that hold own bodies over the next step
+    int cross_contacts = 0;       ///< points between own bodies and ghosts, in the last step
+
+    void list_owned();  ///< fills `owned`
+    void gather_shared();
+    void dismiss_ghosts();
+    [[nodiscard]] bool near_own(const Eigen::Vector3d& center, double radius) const;
     void stop_at_planes(MovingBody& body, const Eigen::Vector3d& before) const;
-    void dismiss_ghosts();  ///< at the end of a step
-    void find_islands();    ///< of contacts and constraints
-    void solve_islands();   ///< in order of ids, again where something unforeseen meets
-    void start_solving();   ///< notes what solve_again goes back to
-    void solve_island(const Island& island, bool follow, IslandSolver& by, const ContactScene& scene);
-    [[nodiscard]] bool is_by_one(const Island& island) const;
-    /// Calls solve(island, solver, scene) for those in `to_solve`.
-    void share_islands(const Solve& solve);
-    void begin_again(const Island& island);
-    std::vector<const Island*> to_solve, small;  // small: of them, for one thread each
-    void note_found();                           ///< contacts, by the islands that have just been solved
-    void move_alone(int body);                   ///< over the step
-    void solve_again();                          ///< islands of bodies in `again`, from the step's start
-    void hold_apart(const StepContacts::Meeting& meeting);
-    std::vector<StepContacts::Meeting> last;  ///< what meets after all rounds
-    void sum_outcomes();                      ///< of all islands
-    [[nodiscard]] ContactScene contact_scene(Crew& crew);
-    [[nodiscard]] bool is_held(const Island& island) const;
-    [[nodiscard]] bool drifts(const Island& island) const;
-    void put_to_sleep();                             ///< islands that are still
-    void count_work();                               ///< see World::work
-    void step();                                     ///< see World::step
-    [[nodiscard]] int still_steps_to_sleep() const;  ///< half a second
-    void list_broken();                              ///< constraints, of the step
-    void list_limited();                             ///< bodies, of the step
-    void begin_step();
-    void end_step();
-    void pose_bodies();
 };
 
 }  // namespace sim

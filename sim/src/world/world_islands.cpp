@@ -8,7 +8,7 @@
 namespace sim {
 namespace {
 
-constexpr double kStillTime = 0.5;  // below the sleep speed, then asleep [s]
+constexpr double kStillTime = 0.5;  // below the sleep speed, after which a body may fall asleep [s]
 
 }  // namespace
 
@@ -24,7 +24,9 @@ void World::Implementation::find_islands() {
         const bool away = shared && !bodies[static_cast<std::size_t>(moves(a) ? a : std::max(b, 0))].own;
         return (solving ? springs_before[constraint].holds : c.holds) && !away;
     };
-    auto is_here = [this](int id) { return !shared || std::binary_search(here.begin(), here.end(), id); };
+    auto is_here = [this](int id) {
+        return !shared || std::binary_search(participants.begin(), participants.end(), id);
+    };
     const auto& manifolds = contacts.manifolds();
     touching.resize(manifolds.size());
     crew->each(touching.size(), 4 * kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
@@ -51,7 +53,7 @@ void World::Implementation::find_islands() {
         }
         return islands[static_cast<std::size_t>(at)];
     };
-    for (const int i : here)
+    for (const int i : participants)
         if (const MovingBody& body = bodies[static_cast<std::size_t>(i)]; body.moves() && !body.asleep)
             island_of(i).bodies.push_back(i);
     for (std::size_t m = 0; m < touching.size(); ++m)

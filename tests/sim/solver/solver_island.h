@@ -14,7 +14,7 @@ struct SolverIsland {
         for (std::size_t i = 0; i < definition.bodies.size(); ++i) {
             kinds.push_back(sim::make_body_kind(definition.bodies[i], settings));
             bodies.push_back(sim::moving_body(definition.bodies[i], kinds[i], settings));
-            here.push_back(static_cast<int>(i));
+            participants.push_back(static_cast<int>(i));
             if (bodies.back().moves()) island.bodies.push_back(static_cast<int>(i));
         }
         for (sim::MovingBody& body : bodies)
@@ -65,10 +65,10 @@ struct SolverIsland {
     std::vector<sim::MovingBody> bodies;
     std::vector<sim::HeldConstraint> constraints;
     std::vector<std::pair<int, int>> joined;
-    std::vector<int> here;
+    std::vector<int> participants;
     sim::Crew crew;
     sim::StepContacts contacts;
-    sim::ContactScene scene{settings, planes, joined, bodies, here, false, crew};
+    sim::ContactScene scene{settings, planes, joined, bodies, participants, false, crew};
     sim::Island island;
     std::unique_ptr<sim::IslandRows> rows;
     std::vector<sim::ActiveForce> no_forces;

@@ -44,7 +44,7 @@ Kick stop_approach(MovingBody& a, MovingBody& b, const ManifoldPoint& point) {
 }  // namespace
 
 ContactScene World::Implementation::contact_scene(Crew& by) {
-    return {settings, planes, joined, bodies, here, shared, by};
+    return {settings, planes, joined, bodies, participants, shared, by};
 }
 
 void World::Implementation::start_solving() {
