@@ -136,7 +136,6 @@ TEST(Commands, WhatTheyWroteBeforeIsReplacedAndNothingElse) {
 }
 
 TEST(Commands, AnInterruptedRunSaysWhatStaysWhere) {
-    (void)::signal(SIGINT, SIG_DFL);  // some shells have it ignored
     for (const auto& [signal, words] :
          {std::pair(SIGINT, std::vector<std::string>{"simulate", "benchmark25", "--steps", "100000000"}),
           {SIGTERM, {"play", "flourish", "--size", "4096x4096"}}}) {

@@ -1,6 +1,6 @@
 // Each call by which a command writes fails once, one run after the other (tests/faults/failing_calls.cpp): every
 // product is whole or absent, and the exit status says whether all of them are there. MUSICWORLD_FAULTS=N strikes
-// every N-th call; by default 17, or every one with MUSICWORLD_LONG.
+// every N-th call; by default 41, or every one with MUSICWORLD_LONG.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using Files = std::map<std::string, std::string>;
 
 long stride() {
     if (const char* chosen = std::getenv("MUSICWORLD_FAULTS")) return std::max(1L, std::atol(chosen));
-    return std::getenv("MUSICWORLD_LONG") != nullptr ? 1 : 17;
+    return std::getenv("MUSICWORLD_LONG") != nullptr ? 1 : 41;
 }
 
 /// A product that holds times: only its shape is the same on every run.

@@ -140,7 +140,7 @@ TEST(Resume, AnotherSceneOtherOptionsOrADamagedFileAreRefusedWithTheirPlace) {
 
 long stride() {
     if (const char* chosen = std::getenv("MUSICWORLD_FAULTS")) return std::max(1L, std::atol(chosen));
-    return std::getenv("MUSICWORLD_LONG") != nullptr ? 1 : 17;
+    return std::getenv("MUSICWORLD_LONG") != nullptr ? 1 : 41;
 }
 
 TEST(Resume, WhateverCallFailsWhileACheckpointIsSavedTheRunEndsWholeOrGoesOnToTheSame) {
