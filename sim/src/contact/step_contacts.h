@@ -119,7 +119,7 @@ private:
     [[nodiscard]] Manifold* find_now(std::uint64_t key);
     [[nodiscard]] int impacts_of(int i, int j) const;  // of a pair in this step
 
-    // Fast pairs, world_impacts.cpp.
+    // Fast pairs, step_impacts.cpp.
     [[nodiscard]] Impact foresee(const ContactScene& scene, int i, int j);
     void follow(const ContactScene& scene, int i, const WorldBodyState& from);
     void accept_impacts(const ContactScene& scene);
