@@ -126,7 +126,7 @@ TEST(DrumGizmo, SoundsEveryStrokeAtItsOnsetPlusItsOwnConstantLatencyAndNoCancell
     Program drumgizmo({"drumgizmo", "-i", "jackmidi", "-I", "midimap=" + (kit / "map.xml").string(), "-o",
                        "jackaudio", kit / "kit.xml"});
     // Where the server was held up, strokes are lost, sound together or come twice, and its count of frames moves against the
-    // clock by milliseconds: that says nothing of us, so they are struck again. So they are where DrumGizmo had not begun.
+    // clock by milliseconds: that says nothing of us, so they are struck again; so, too, where DrumGizmo had not begun.
     Performance performance;
     for (int attempt = 0; attempt < 5; ++attempt) {
         performance = perform();
