@@ -154,15 +154,18 @@ Figures run_bench_program(const std::string& bench, const BenchOptions&, const S
 
 const std::vector<Bench> kBenches = {
     {"tracking", "a minute", {"bench.json"}, run_bench_program},
-    {"sim", "10 minutes", {"bench.json"}, bench_the_simulation},
-    {"hard", "10 minutes", {"bench.json", "hard.csv", "hard.svg", "hard.html"}, bench_the_hard_scenes},
+    {"sim", "ten minutes", {"bench.json"}, bench_the_simulation},
+    {"hard",
+     "a quarter of an hour",
+     {"bench.json", "hard.csv", "hard.svg", "hard.html"},
+     bench_the_hard_scenes},
     {"workers",
-     "10 minutes",
+     "ten minutes",
      {"bench.json", "speed_up", "speed_up.csv", "bound.csv", "migration.svg"},
      bench_the_workers},
-    {"render", "a minute", {"bench.json"}, run_bench_program},
-    {"audio", "a minute", {"bench.json"}, run_bench_program},
-    {"tradeoff", "10 minutes", {"tradeoff.json", "tradeoff.csv", "tradeoff.svg"}, bench_the_tradeoff}};
+    {"render", "ten seconds", {"bench.json"}, run_bench_program},
+    {"audio", "ten seconds", {"bench.json"}, run_bench_program},
+    {"tradeoff", "two minutes", {"tradeoff.json", "tradeoff.csv", "tradeoff.svg"}, bench_the_tradeoff}};
 
 Figures run_bench(const Bench& bench, const BenchOptions& options, const std::string& out, const Show& show) {
     say(fmt::format("bench {}: all of it takes about {} on two cores", bench.name, bench.length));

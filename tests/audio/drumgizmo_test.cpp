@@ -126,11 +126,11 @@ TEST(DrumGizmo, SoundsEveryStrokeAtItsOnsetPlusItsOwnConstantLatencyAndNoCancell
     Program drumgizmo({"drumgizmo", "-i", "jackmidi", "-I", "midimap=" + (kit / "map.xml").string(), "-o",
                        "jackaudio", kit / "kit.xml"});
     // Where the server was held up, strokes are lost, sound together or come twice, and its count of frames moves against the
-    // clock by milliseconds: that says nothing of us, so they are struck again.
+    // clock by milliseconds: that says nothing of us, so they are struck again; so, too, where DrumGizmo had not begun.
     Performance performance;
     for (int attempt = 0; attempt < 5; ++attempt) {
         performance = perform();
-        if (!performance.disturbed) break;
+        if (performance.planned > 0 && !performance.disturbed) break;
     }
     drumgizmo.kill();  // it takes seconds to end of its own accord
     const std::vector<double>& offsets_ms = performance.offsets_ms;
