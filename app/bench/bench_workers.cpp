@@ -196,10 +196,11 @@ public:
                 add(name + "_cpu", speed.cpu_s, "s, all threads");
             }
         }
-        note(fmt::format(
-            "threads: {} steps, medians of {} by the wall clock, in turns of 25 steps, times one thread; other "
-            "load on the machine makes them slower.",
-            options_.steps, options_.rounds));
+        note(
+            fmt::format("threads: {} steps, medians of {} by the wall clock, in turns of 25 steps, times one "
+                        "thread; other "
+                        "load on the machine makes them slower.",
+                        options_.steps, options_.rounds));
     }
 
     /// Real processes, as many as there are cores for them.

@@ -100,8 +100,8 @@ TEST(BenchWorkers, OnThisMachineRunsOfProcessesHaveAWallClockAndACriticalPath) {
     options.only = {"threads", "processes", "kit"};
     std::map<std::string, double> figures =
         figures_by_name(bench_workers(options, [](const std::string&) {}));
-    for (const std::string name :
-         {"processes_bodies9_alone", "processes_bodies9_workers1_async", "processes_bodies9_workers1_barrier"})
+    for (const std::string name : {"processes_bodies9_alone", "processes_bodies9_workers1_async",
+                                   "processes_bodies9_workers1_barrier"})
         for (const char* what : {"_elapsed", "_critical_path", "_speed_up", "_critical_path_speed_up"})
             EXPECT_GT(figures[name + what], 0) << name << what;
     EXPECT_EQ(figures.at("threads_bodies9_threads1_speed_up"), 1);

@@ -7,8 +7,8 @@
 #include <limits>
 #include <utility>
 
-#include "messages/world_record_codec.h"
 #include "body/body_kind.h"
+#include "messages/world_record_codec.h"
 
 namespace sim {
 namespace {
@@ -303,7 +303,8 @@ std::vector<CrossImpulse> read_crossed(ByteReader& all) {
     std::vector<CrossImpulse> crossed(all.count(kCrossed));
     SmallReader in(all.take(kCrossed * crossed.size()));
     for (CrossImpulse& c : crossed) {
-        const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(), body = own & ~kRebound;
+        const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(),
+                   body = own & ~kRebound;
         const auto exponents = in.number<std::uint8_t>();
         if (body >= kMostWorldBodies || ghost >= kMostWorldBodies || body == ghost)
             throw DecodeError("an impulse between bodies that is none");

@@ -1,5 +1,4 @@
 #pragma once
-#include "world/shared_world.h"
 #include <functional>
 #include <map>
 #include <optional>
@@ -12,6 +11,7 @@
 #include "shared/scene_clock.h"
 #include "shared/shared_contacts.h"
 #include "shared/structures.h"
+#include "world/shared_world.h"
 
 namespace sim {
 

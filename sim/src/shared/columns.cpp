@@ -4,11 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "messages/worker_messages.h"
 #include "shape/generalized_surface.h"
 #include "shared/initial_partition.h"
 #include "shared/structures.h"
-
-#include "messages/worker_messages.h"
 
 namespace sim {
 namespace {
@@ -167,8 +166,9 @@ std::map<std::uint32_t, std::set<std::uint32_t>> Holdings::neighbours() const {
 ColumnWatch::ColumnWatch(const WorldScene& scene)
     : columns_(scene), lots_(joined_lots(scene)), column_(lots_.size()) {}
 
-Holdings ColumnWatch::holdings(std::uint32_t self, const SharedWorld& world, std::span<const std::uint32_t> owner,
-                               const BodyCosts& costs, const std::function<Eigen::Vector3d(int)>& place,
+Holdings ColumnWatch::holdings(std::uint32_t self, const SharedWorld& world,
+                               std::span<const std::uint32_t> owner, const BodyCosts& costs,
+                               const std::function<Eigen::Vector3d(int)>& place,
                                const std::vector<std::vector<int>>& structures) {
     const auto there = [&](int body) {
         return body < world.bodies() && owner[static_cast<std::size_t>(body)] != kApplication;

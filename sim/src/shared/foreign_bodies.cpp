@@ -204,7 +204,8 @@ void ForeignBodies::add_owed(int body) {
         const Heard& theirs = slots->second[step % keep_];
         if (theirs.step != step || step <= told_.heard) return;  // it knew
         const Heard* own = heard(self_, step);
-        if (!own || (std::ranges::none_of(own->crossed, rebound) && std::ranges::none_of(theirs.crossed, rebound)))
+        if (!own ||
+            (std::ranges::none_of(own->crossed, rebound) && std::ranges::none_of(theirs.crossed, rebound)))
             continue;
         StepImpulse owed;
         const auto find = [](const std::vector<CrossImpulse>& crossed, int one, int other) {

@@ -1,10 +1,10 @@
 #pragma once
-#include "world/shared_world.h"
 #include <map>
 #include <memory>
 #include <vector>
 
 #include "messages/worker_messages.h"
+#include "world/shared_world.h"
 
 namespace sim {
 

@@ -18,8 +18,8 @@ const CrossImpulse* find(const std::vector<CrossImpulse>& crossed, int own, int 
 
 }  // namespace
 
-SharedContacts::SharedContacts(SharedWorld& world, const ForeignBodies& heard, std::uint32_t self, Owners owners,
-                               int keep)
+SharedContacts::SharedContacts(SharedWorld& world, const ForeignBodies& heard, std::uint32_t self,
+                               Owners owners, int keep)
     : world_(&world), heard_(&heard), self_(self), owners_(owners), keep_(static_cast<std::uint64_t>(keep)) {}
 
 // Which of the two counts, see the class.

@@ -1,9 +1,9 @@
 #pragma once
-#include "world/shared_world.h"
 #include <map>
 #include <vector>
 
 #include "shared/foreign_bodies.h"
+#include "world/shared_world.h"
 
 namespace sim {
 
@@ -35,7 +35,8 @@ public:
         const std::vector<std::uint8_t>& awaits;  ///< it does not know that yet
         const std::vector<std::uint32_t>& owner;
     };
-    SharedContacts(SharedWorld& world, const ForeignBodies& heard, std::uint32_t self, Owners owners, int keep);
+    SharedContacts(SharedWorld& world, const ForeignBodies& heard, std::uint32_t self, Owners owners,
+                   int keep);
 
     /// The own bodies and `worker` have done `step`: what both found is compared, once. `now`: steps done here.
     void compare(std::uint32_t worker, std::uint64_t step, std::uint64_t now);

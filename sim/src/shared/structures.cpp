@@ -156,8 +156,9 @@ std::vector<std::vector<int>> structures(const SharedWorld& world, std::span<con
     return result;
 }
 
-std::vector<std::vector<int>> flat_structures(const SharedWorld& world, std::span<const int> bodies, double size,
-                                              double within_s, std::span<const OthersBody> others) {
+std::vector<std::vector<int>> flat_structures(const SharedWorld& world, std::span<const int> bodies,
+                                              double size, double within_s,
+                                              std::span<const OthersBody> others) {
     const Eigen::Vector3d& gravity = world.settings().gravity;
     if (gravity.isZero()) return {};
     const Eigen::Vector3d up = -gravity.normalized();

@@ -31,8 +31,9 @@ struct OthersBody {
 /// other within a time [s], as they move now: across gravity at the same time, along gravity whenever, as who falls first may
 /// be stopped. Near: at most 10 % of the size apart, across gravity 2 % if both are slow. `others` count, and are not in the
 /// result. The rest as for structures.
-[[nodiscard]] std::vector<std::vector<int>> flat_structures(const SharedWorld& world, std::span<const int> bodies,
-                                                            double size, double within_s,
+[[nodiscard]] std::vector<std::vector<int>> flat_structures(const SharedWorld& world,
+                                                            std::span<const int> bodies, double size,
+                                                            double within_s,
                                                             std::span<const OthersBody> others = {});
 
 /// All bodies of a scene before their first step, also those to come.

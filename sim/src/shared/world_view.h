@@ -1,10 +1,10 @@
 #pragma once
-#include "world/shared_world.h"
 #include <deque>
 #include <vector>
 
 #include "messages/worker_messages.h"
 #include "shared/scene_clock.h"
+#include "world/shared_world.h"
 
 namespace sim {
 
@@ -29,7 +29,7 @@ public:
     void begin() { events_now_ = clock_.apply(world_, step_) || events_now_; }
 
     [[nodiscard]] const SharedWorld& world() const noexcept { return world_; }  ///< all bodies at step()
-    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }   ///< shown
+    [[nodiscard]] std::uint64_t step() const noexcept { return step_; }         ///< shown
     [[nodiscard]] const SceneClock& clock() const noexcept { return clock_; }
     /// Every body has been still for half a second and no event is left.
     [[nodiscard]] bool at_rest() const;

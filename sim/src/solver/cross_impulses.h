@@ -43,7 +43,7 @@ public:
         any_ = false;
     }
     void go_back() { pairs_.resize(first_); }  ///< to where it began
-    /// Whether a ghost takes part. Such an island is swept, as all of it would be.
+    /// Whether a ghost takes part. Such an island is always swept: it is a part of a larger one, which would be.
     [[nodiscard]] bool among_ghosts() const noexcept { return pairs_.size() > first_; }
     [[nodiscard]] bool any() const noexcept { return any_; }  ///< row triple that is recorded
     /// Sets `pair` and `recorded` of a contact's rows.

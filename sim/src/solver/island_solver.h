@@ -9,12 +9,15 @@ namespace sim {
 
 /// Moves one island over one step.
 ///
-/// Islands without springs are swept (Sweeps). Directly (DirectSolution) go islands with springs, islands where a timed force acts
-/// and nothing touches (a constant force then moves a body exactly), and islands whose contacts a step's sweeps leave far from
-/// solved, or with much lighter bodies under heavy ones, where a factorisation is cheap enough; such a step is taken anew, and
-/// kept unless it gives energy (contacts of bodies deep in each other may contradict each other). Where a factorisation is too
-/// dear, springs alone are factorised; if all are soft they are forces, as they always are among contacts. Impacts come first in a
-/// substep (Impacts). After the step no island that only contacts and joints hold has gained energy (EnergyBalance).
+/// There are two ways: sweeps over contacts (Sweeps), and direct solutions of all rows at once (DirectSolution).
+///   - An island of contacts alone is swept. If that leaves its contacts far from solved, or a body rests on one 30 times lighter,
+///     the step is taken anew by direct solutions, where a factorisation is cheap enough. It is kept unless it gives energy, as
+///     contacts of bodies deep in each other do, which contradict each other.
+///   - An island with springs is solved directly, contacts included where that is cheap enough; else springs are solved directly
+///     and contacts swept, in turn. If all springs are soft and there are contacts, springs are forces in sweeps.
+///   - A body that touches nothing and on which a timed force acts is solved directly: a constant force then moves it exactly.
+/// In both ways impacts come first in a substep (Impacts). After the step no island that only contacts and joints hold has gained
+/// energy (EnergyBalance).
 ///
 /// A body that strikes faster than its modes can yield within what they describe is rigid in that step.
 ///

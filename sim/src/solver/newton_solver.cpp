@@ -240,9 +240,9 @@ double NewtonSolver::left_open() const {
     return kLeftAtRest + kLeftShare * std::sqrt(fastest);
 }
 
-// The contacts' impulses and the velocities. Overlaps yield softly, so that how a load is shared out is defined; friction, and
-// the second half's impulses, are held softly to what they were a round before (a proximal point iteration), with friction's
-// bounds by that round, so that nothing of their softness is left.
+// The contacts' impulses and the velocities, in rounds (a proximal point iteration). In a round an impulse without compliance may
+// differ from the round before's at a cost, and friction is bounded by the normal impulse of the round before. The rounds end where
+// nothing changes any more, so nothing is left of that cost.
 void NewtonSolver::settle_contacts() {
     if (!with_contacts_) return settle_in_turn();
     const double enough = left_open();

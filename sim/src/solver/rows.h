@@ -65,25 +65,29 @@ struct ContactRows : Rows {
     float separation;  ///< as the step began [m]
     float now;         ///< as the substep began, or is [m]
     float friction, restitution;
-    float approach;          ///< speed along the normal before its first impulse, negative [m/s]
-    double starts;           ///< of an impact: when it acts, else negative; infinite: it does not happen [s]
-    int begins = -1;         ///< of an impact: number of the substep
+    float approach;  ///< speed along the normal before its first impulse, negative [m/s]
+    // An impact (firm) is foreseen at a time within the step and acts in one substep; before that its rows do nothing. Then it is
+    // a contact like others, unless it is over.
+    bool firm;  ///< an impact; such a contact does not yield
+    double
+        starts;  ///< time at which it acts, since the step's start [s]; negative: no impact; infinite: it never acts
+    int begins = -1;    ///< number of the substep in which it acts, -1: no impact
+    bool over = false;  ///< it has acted, and its bodies part: no contact afterwards
+    // While an impact is solved, of all contacts:
+    bool in_impact = false;  ///< takes part in it
+    bool striking = false;   ///< takes part in the reflection that is being solved
+    float bias = 0;          ///< speed along the normal that this reflection leaves, negative [m/s]
     float drifted = 0;       ///< by `drift` along the normal, since the step's start [m]
-    bool over = false;       ///< an impact that is no contact afterwards
-    bool striking = false;   ///< part of the reflection that is being solved
-    bool in_impact = false;  ///< of the impact that is being solved
-    float bias = 0;          ///< then: speed along the normal that it leaves, negative [m/s]
     float taken;             ///< energy that its normal impulses have taken out of the bodies [J]
     float slide_mass;        ///< of K's tangents: 2 / (K11 + K22) [kg]
     float inverse_normal,
         inverse_tangent[3];  ///< of K: 1 / K00; entries 00, 01, 11 of the tangents' inverse [kg]
     float impulse[3];        ///< of the substep [N s]
-    float kept[3];           ///< before a sweep that only positions see; in an impact: speeds before it
-    float at_move[3];        ///< part of `impulse` with which the bodies moved [N s]
-    float largest;           ///< normal impulse in this step [N s]
-    bool emerging;           ///< began deep inside each other, and still overlap
-    bool firm;               ///< an impact, which does not yield
-    int pair = -1;           ///< place among the recorded pairs, see CrossImpulses
+    float kept[3];     ///< put aside: impulses, before a sweep that only positions see; in impacts speeds
+    float at_move[3];  ///< part of `impulse` with which the bodies moved [N s]
+    float largest;     ///< normal impulse in this step [N s]
+    bool emerging;     ///< began deep inside each other, and still overlap
+    int pair = -1;     ///< place among the recorded pairs, see CrossImpulses
 };
 
 /// A point that a constraint holds.

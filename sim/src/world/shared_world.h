@@ -38,7 +38,7 @@ public:
     void kick(int body, const Eigen::Vector3d& linear, const Eigen::Vector3d& angular);
     /// One step of a body that touches nothing but planes, which stop it, under gravity and `held`.
     void extrapolate(int body, WorldBodyState& state, const StepImpulse* held);
-    /// Records what other own bodies that move and constraints give an own body.
+    /// Records what an own body gets from other own bodies and from constraints: other owners' ghosts of it are held by that.
     void watch(int body, bool watched);
 
     // Of the last step.

@@ -54,7 +54,7 @@ void World::Implementation::start_solving() {
     outcomes.resize(bodies.size());
     solved.assign(bodies.size(), 0);
     again.assign(bodies.size(), 0);
-    // Of others' bodies alone, too: own ones may meet them unforeseen.
+    // Also of islands of ghosts alone: own bodies may meet these unforeseen.
     for (std::size_t i = 0; i < islands_used; ++i) {
         const std::vector<int>& of_island = islands[i].bodies;
         crew->each(of_island.size(), kBodiesAPiece, [&](int, std::size_t first, std::size_t end) {
@@ -106,7 +106,7 @@ bool World::Implementation::is_by_one(const Island& island) const {
 void World::Implementation::share_islands(const Solve& solve) {
     Crew& by = *crew;
     const ContactScene by_all = contact_scene(by), by_one = contact_scene(alone);
-    // Among ghosts one solver notes what is given to them.
+    // A shared world has one solver for all islands: it records what ghosts are given in the order of islands.
     if (by.size() == 1 || shared) {
         for (const Island* island : to_solve) solve(*island, solver(), is_by_one(*island) ? by_one : by_all);
         return;
@@ -222,7 +222,7 @@ void World::Implementation::sum_outcomes() {
         counts.constraints_broken += outcome.broken;
     }
     if (breaks) set_joined();
-    if (!outside.allFinite()) outside = outside_before;  // of a body that is breaks
+    if (!outside.allFinite()) outside = outside_before;  // of a body that is not finite any more
 }
 
 void World::Implementation::solve_islands() {

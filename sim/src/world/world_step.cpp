@@ -108,7 +108,7 @@ bool World::Implementation::any_broken(Concerned concerned) {
 
 // After a step: bodies that it broke, before any reader sees them.
 void World::Implementation::quarantine_results() {
-    // Asleep: not of an island that was solved.
+    // Islands that were solved, so of awake bodies.
     const bool any = any_broken([](const MovingBody& body) { return body.moves(); });
     for (std::size_t i = 0; i < islands_used; ++i) {
         if (!is_own(islands[i])) continue;
