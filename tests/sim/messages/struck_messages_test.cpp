@@ -61,13 +61,4 @@ TEST(StruckMessages, TwentyThousandMutationsAreRefusedOrDecodeToSomethingThatEnc
     EXPECT_GT(accepted, 1000);
 }
 
-TEST(StruckMessages, AnUnsealedChangeOfAnyByteIsRefused) {
-    const std::vector<std::uint8_t> good = sim::encode({}, struck_samples()[2]);
-    for (std::size_t i = 0; i < good.size(); ++i) {
-        std::vector<std::uint8_t> bad = good;
-        bad[i] ^= 0x10;
-        EXPECT_THROW((void)sim::decode_message(bad), sim::DecodeError) << i;
-    }
-}
-
 }  // namespace
