@@ -57,14 +57,7 @@ public:
             sticks_.emplace_back(static_cast<std::uint32_t>(sticks_.size()), parts.stick, o.sound_lead_s);
         }
         pipeline_.emplace(
-            parts.kit,
-            PipelineSettings{.t0_s = t0_s_,
-                             .tip_radius_m = parts.stick.radius_m,
-                             .render_lead_s = o.render_lead_s,
-                             .release_margin_s = o.release_margin_s,
-                             .false_cost = o.false_cost,
-                             .cancelling = o.cancelling},
-            sticks_, parts.simulation,
+            parts.kit, pipeline_settings(o, parts.stick, t0_s_), sticks_, parts.simulation,
             [this](const audio::Note& note, bool scheduled) { send(note, scheduled); },
             contact_model(o.sound_predictor));
         if (parts.pedals)

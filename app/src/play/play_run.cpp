@@ -186,6 +186,15 @@ fs::path orchestra_file() {
     return assets_folder() / "orchestra" / "musicworld.orc";
 }
 
+PipelineSettings pipeline_settings(const PlayOptions& options, const StickGeometry& stick, double t0_s) {
+    return {.t0_s = t0_s,
+            .tip_radius_m = stick.radius_m,
+            .render_lead_s = options.render_lead_s,
+            .release_margin_s = options.release_margin_s,
+            .false_cost = options.false_cost,
+            .cancelling = options.cancelling};
+}
+
 std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers) {
     if (workers == 0) return sim::make_local_simulation(bodies_of(kit));
     return sim::make_distributed_simulation(

@@ -16,6 +16,7 @@
 #include "kit/kit.h"
 #include "pictures/frame_thread.h"
 #include "play/play.h"
+#include "play/strike_pipeline.h"
 #include "process/clock.h"
 #include "report/plot.h"
 #include "strikes/strike.h"
@@ -44,6 +45,9 @@ void require_tools(const PlayOptions& options);
 [[nodiscard]] std::vector<audio::Note> notes_of(const PlayResult& result, const Kit& kit);
 [[nodiscard]] std::filesystem::path orchestra_file();
 [[nodiscard]] std::unique_ptr<sim::Simulation> make_simulation(const Kit& kit, int workers);
+/// t0_s: time of audio sample 0, by the clock of the run's samples.
+[[nodiscard]] PipelineSettings pipeline_settings(const PlayOptions& options, const StickGeometry& stick,
+                                                 double t0_s);
 /// The thread that draws into the run's folder `frames`; null with --no-frames. `scenes`: one for each level
 /// of picture quality.
 [[nodiscard]] std::unique_ptr<FrameThread> start_frames(const PlayOptions& options,

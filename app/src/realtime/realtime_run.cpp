@@ -89,16 +89,8 @@ void RealtimeRun::begin_lap(std::uint64_t lap) {
     next_move_ = 0;
     // A schedule begins anew; a foot that MIDI tells of stays where it is.
     if (!session_.moves.empty()) pedals_.rest(static_cast<std::int64_t>(lap) * session_.period_samples);
-    const PlayOptions& play = options_.play;
     pipeline_ = std::make_unique<StrikePipeline>(
-        session_.kit,
-        PipelineSettings{.t0_s = t0_s_,
-                         .tip_radius_m = session_.stick.radius_m,
-                         .render_lead_s = play.render_lead_s,
-                         .release_margin_s = play.release_margin_s,
-                         .false_cost = play.false_cost,
-                         .cancelling = play.cancelling},
-        sticks_, *session_.simulation,
+        session_.kit, pipeline_settings(options_.play, session_.stick, t0_s_), sticks_, *session_.simulation,
         [this](const audio::Note& note, bool scheduled) { send(note, scheduled); }, session_.contacts);
 }
 

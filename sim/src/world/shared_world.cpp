@@ -73,10 +73,6 @@ void SharedWorld::restore(const WorldRecord& record) {
     implementation_->restore(record);
 }
 
-void SharedWorld::restore(const std::vector<SpringRecord>& springs) {
-    implementation_->restore(springs);
-}
-
 void SharedWorld::set_step(std::uint64_t step) {
     implementation_->set_step(step);
 }

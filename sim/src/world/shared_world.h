@@ -25,8 +25,7 @@ public:
     [[nodiscard]] WorldRecord record(int body) const;  ///< at the end of the last step
     void record(int body, WorldRecord& out) const;     ///< the same, into storage that is there
     void restore(const WorldRecord& record);           ///< sets a body's state; wakes no other body
-    void restore(const std::vector<SpringRecord>& springs);
-    void set_step(std::uint64_t step);  ///< time_s and counts().steps continue from here
+    void set_step(std::uint64_t step);                 ///< time_s and counts().steps continue from here
 
     /// Those of `foreign` that have to be placed for the next step, because they may touch an own body.
     void near_own(const std::vector<ForeignBall>& foreign, std::vector<int>& near);
