@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "simulated_processors.h"
+
 namespace sim_bench {
 
 /// A distributed run and what was seen of it.
@@ -13,7 +15,7 @@ struct SharedRun {
         std::uint64_t step;
         int bodies, from, to;
     };
-    sim::DistributedResult result;
+    SimulatedResult result;              ///< of other runs without what repeating alone tells
     std::vector<sim::WorkerStep> steps;  ///< as told
     std::vector<Trade> trades;
     std::vector<Eigen::Vector3d> after_a_second;  ///< centres
@@ -28,7 +30,7 @@ struct SharedRun {
 
 /// `also` is told, too.
 [[nodiscard]] SharedRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
-                                    const sim::SimulatedProcessors& processors,
+                                    const SimulatedProcessors& processors,
                                     sim::DistributedObserver* also = nullptr);
 [[nodiscard]] SharedRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
                                     const sim::DistributedLaunch& launch);

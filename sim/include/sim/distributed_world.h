@@ -94,10 +94,6 @@ struct DistributedResult {    ///< of a whole run
     std::vector<FirstStep> limited, broken;                     ///< see World::limited and World::broken
     bool one_owner = false;     ///< one worker stepped all bodies, which are too unlike to be shared out
     bool rest_reached = false;  ///< until_rest: every body came to rest
-    /// SimulatedProcessors::repeat_alone: the workers' processor time in turns over that of the same work one worker
-    /// after the other: elapsed_s, as far as it is work, is too long by this factor.
-    double cold_caches = 1;
-    double busiest_s = 0;  ///< likewise: the time of the worker that then takes longest, by the run's clock
 };
 
 /// Where a run in one process is at the end of a step: all that its next steps and its result depend on, apart
@@ -158,39 +154,6 @@ struct DistributedLaunch {
 DistributedResult run_distributed(const WorldScene& scene, const DistributedSettings& settings,
                                   const DistributedLaunch& launch, DistributedObserver& observer);
 
-/// Simulated processors: workers in this process, each with a clock of its own that advances by the cost of
-/// its work, once it has the scene. Events happen in the order of simulated time.
-struct SimulatedProcessors {
-    int count = 1;
-    double latency_s =
-        2e-4;  ///< from worker to worker, by way of the application: half of it to there, half from there
-    double slowdown = 1;  ///< simulated seconds per second of what steps cost, measured or modelled
-    bool modelled =
-        false;  ///< costs are counted (World::work), not measured: results are a pure function of the input
-    double seconds_per_work = 2e-6;  ///< modelled: of one unit of work, times slowdown
-    /// In turns in one thread workers find their caches cold, which a processor of its own does not. So afterwards
-    /// each worker does all that it did once more, without the others, and DistributedResult::cold_caches tells
-    /// how much faster that is. That is measured, also if costs are modelled. Every message is kept for it.
-    bool repeat_alone = false;
-    /// A further factor of a worker's step, such as a straggler's; empty: none.
-    std::function<double(int worker, std::uint64_t step)> factor;
-    /// Failures at simulated times, for tests.
-    struct Failure {
-        double time_s;
-        int worker;
-        enum class Kind { kill, stop, resume, cut, drain, join } kind;
-    };
-    std::vector<Failure> failures;  ///< in any order
-    double silence_s = 1;           ///< a worker silent for so long is lost
-};
-
-DistributedResult simulate_processors(const WorldScene& scene, const DistributedSettings& settings,
-                                      const SimulatedProcessors& processors, DistributedObserver& observer);
-
-/// Hash of a libm probe, the processor's features in use, the compiler, the protocol's version and a small
-/// world's state after some steps. Hosts with equal fingerprints get equal bits of one process.
-[[nodiscard]] std::uint64_t step_fingerprint();
-
 /// Writes CURVE keys into a new folder (0700): application.key (secret, 0600), application.pub, and for each
 /// worker NAME NAME.key (its secret and public keys and the application's public one: all that it needs), and
 /// `allowed`, the public keys and names, a line each. Throws InputError for a name or folder that cannot be
@@ -201,6 +164,7 @@ void make_keys(const std::filesystem::path& folder, const std::vector<std::strin
 /// ends. SIGTERM or SIGINT: hands its bodies over and leaves. `key`: file made by make_keys, empty: none. `threads`
 /// share out the steps of a world (World::use_threads). Returns the exit status. Throws InputError for an endpoint or key that is refused, WorkerError
 /// if nobody answers.
-[[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key, int threads = 1);
+[[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key = {},
+                             int threads = 1);
 
 }  // namespace sim

@@ -9,7 +9,7 @@
 #include "shared/body_costs.h"
 #include "shared/columns.h"
 #include "shared/neighbour_telling.h"
-#include "shared/scene_clock.h"
+#include "run/scene_clock.h"
 #include "shared/shared_contacts.h"
 #include "shared/structures.h"
 

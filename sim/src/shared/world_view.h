@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "messages/worker_messages.h"
-#include "shared/scene_clock.h"
+#include "run/scene_clock.h"
 
 namespace sim {
 

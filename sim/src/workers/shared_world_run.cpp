@@ -12,7 +12,7 @@
 #include "workers/elapsed.h"
 #include "workers/worker_gate.h"
 #include "workers/worker_process.h"
-#include "world/processor_time.h"
+#include "run/processor_time.h"
 
 namespace sim {
 namespace {

@@ -166,10 +166,6 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
 
 }  // namespace
 
-int run_worker(const std::string& endpoint) {
-    return run_worker(endpoint, {});
-}
-
 int run_worker(const std::string& endpoint, const std::filesystem::path& key, int threads) {
     std::optional<WorkerKeys> keys;
     if (!key.empty()) keys = read_worker_keys(key);

@@ -11,7 +11,7 @@
 #include "sim/errors.h"
 #include "workers/elapsed.h"
 #include "workers/leave_signals.h"
-#include "world/processor_time.h"
+#include "run/processor_time.h"
 
 namespace sim {
 namespace {

@@ -431,7 +431,7 @@ TEST(BoundedExchange, HeapsOfBodiesThatReboundComeToRest) {
         private:
             double &fastest_, &late_;
         } record(fastest, late);
-        (void)simulate_processors(scene, settings, world_test::processors(10), record);
+        (void)sim_bench::simulate_processors(scene, settings, world_test::processors(10), record);
         // They start with at most 2.8 m/s, and gain 3.5 m/s by falling from the top.
         EXPECT_LT(fastest, 5) << seed;
         EXPECT_LT(late, 0.3) << seed;
@@ -458,7 +458,8 @@ TEST(BoundedExchange, UntilRestARunGoesOnWhenItsLastEventReleasesASleeper) {
         bool asleep_at_event = false;
         double height = 0;
     } record;
-    const DistributedResult result = simulate_processors(scene, settings, world_test::processors(2), record);
+    const DistributedResult result =
+        sim_bench::simulate_processors(scene, settings, world_test::processors(2), record);
     EXPECT_TRUE(record.asleep_at_event) << "else this shows nothing";
     EXPECT_TRUE(result.rest_reached);
     EXPECT_GT(result.steps, 230u) << "it falls for more than half a second";
@@ -485,7 +486,7 @@ TEST(BoundedExchange, BodiesThatAnEventAddsTakePartWhoeverOwnsThem) {
             } record;
             DistributedSettings settings = world_test::for_steps(step + 240);
             settings.bound = 0;
-            (void)simulate_processors(scene, settings, world_test::processors(workers), record);
+            (void)sim_bench::simulate_processors(scene, settings, world_test::processors(workers), record);
             const World expected = world_test::alone(scene, settings.steps);
             ASSERT_EQ(record.now.size(), 5u);
             // At rest on the shelf, and beside the ball that it fell on: where it rolled to may differ out of step.

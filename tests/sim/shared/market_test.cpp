@@ -240,11 +240,11 @@ TEST(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
             for (const bool steady : {true, false}) {
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
                 const sim::DistributedSettings settings = all_on_one(300);
-                sim::SimulatedProcessors how = processors(workers);
+                sim_bench::SimulatedProcessors how = processors(workers);
                 how.latency_s = 2e-6;
                 if (!steady) how.factor = unsteady;
                 Sales record;
-                const auto result = sim::simulate_processors(scene, settings, how, record);
+                const auto result = sim_bench::simulate_processors(scene, settings, how, record);
                 EXPECT_EQ(result.refused_messages, 0u) << record.notes;
                 const double column = double(workers) / double(scene.world.bodies.size());
                 const std::string what = std::to_string(workers) + " workers, " +
@@ -264,10 +264,10 @@ TEST(MarketRun, AllOnOneIsLevelWithinTenStepsHoweverLongMessagesTake) {
             for (const double latency : {2e-4, 2e-2}) {  // a step of one takes 30 to 400 us
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
                 const sim::DistributedSettings settings = all_on_one(30);
-                sim::SimulatedProcessors how = processors(workers);
+                sim_bench::SimulatedProcessors how = processors(workers);
                 how.latency_s = latency;
                 Record record;
-                (void)sim::simulate_processors(scene, settings, how, record);
+                (void)sim_bench::simulate_processors(scene, settings, how, record);
                 const double column = double(workers) / double(scene.world.bodies.size());
                 EXPECT_LE(excess(record, workers, 20), std::max(0.15, 1.05 * column))
                     << workers << " workers, " << scene.world.bodies.size() << " bodies, " << latency;
@@ -281,11 +281,11 @@ TEST(MarketRun, OneWorkerAtHalfSpeedCostsLittleWithBalancing) {
         for (const bool trade : {false, true}) {
             sim::DistributedSettings settings = for_steps(800);
             settings.market.trade = trade;
-            sim::SimulatedProcessors how = processors(5);
+            sim_bench::SimulatedProcessors how = processors(5);
             how.latency_s = 2e-6;
             how.factor = [slow](int worker, std::uint64_t) { return worker == slow ? 2.0 : 1.0; };
             Record record;
-            elapsed[trade] = sim::simulate_processors(scene, settings, how, record).elapsed_s;
+            elapsed[trade] = sim_bench::simulate_processors(scene, settings, how, record).elapsed_s;
         }
         // 2 / (5 / 4.5) = 1.8 at best; the first 10 steps and the sale take their time.
         EXPECT_GT(elapsed[0] / elapsed[1], 1.5) << slow;

@@ -232,13 +232,13 @@ TEST(Structures, StandOutOfStepAsInOneProcessAndAreNeverSoldInParts) {
             double half_way = 0;
             for (const int killed : {-1, 0, 1}) {
                 Moved record;
-                sim::SimulatedProcessors how = processors(workers);
+                sim_bench::SimulatedProcessors how = processors(workers);
                 if (killed >= 0) {
-                    how.failures = {{half_way, killed, sim::SimulatedProcessors::Failure::Kind::kill}};
+                    how.failures = {{half_way, killed, sim_bench::SimulatedProcessors::Failure::Kind::kill}};
                     how.silence_s = half_way / 8;
                 }
                 const sim::DistributedResult result =
-                    sim::simulate_processors(scene, bounded(480, 4), how, record);
+                    sim_bench::simulate_processors(scene, bounded(480, 4), how, record);
                 half_way = result.elapsed_s / 2;
                 EXPECT_EQ(result.steps, 480u);
                 EXPECT_EQ(result.lost, killed < 0 ? 0 : 1);
@@ -305,16 +305,17 @@ TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) 
                         }
                         std::vector<Eigen::Vector3d> places;
                     } record;
-                    sim::SimulatedProcessors how = processors(3);
+                    sim_bench::SimulatedProcessors how = processors(3);
                     sim::DistributedSettings settings = bounded(steps, bound);
                     settings.market.trade = side < 0.2;  // with and without balancing
                     if (killed >= 0) {
                         // While it falls.
-                        how.failures = {{end / 6, killed, sim::SimulatedProcessors::Failure::Kind::kill}};
+                        how.failures = {
+                            {end / 6, killed, sim_bench::SimulatedProcessors::Failure::Kind::kill}};
                         how.silence_s = end / 100;
                     }
                     const sim::DistributedResult result =
-                        sim::simulate_processors(scene, settings, how, record);
+                        sim_bench::simulate_processors(scene, settings, how, record);
                     end = killed < 0 ? result.elapsed_s : end;
                     EXPECT_EQ(result.steps, steps);
                     ASSERT_EQ(record.places.size(), 10u);
@@ -355,7 +356,7 @@ TEST(Structures, AmongBallsAreNotSoldAndGatheredAgainForEver) {
     for (const int late : {0, 1}) {
         Moved record;
         trades[late] =
-            sim::simulate_processors(scene, bounded(late ? 600 : 300, 4), processors(3), record).trades;
+            sim_bench::simulate_processors(scene, bounded(late ? 600 : 300, 4), processors(3), record).trades;
     }
     EXPECT_LE(trades[1], trades[0] + 4);  // balls may still be sold; the wall went to and fro eight times
 }
@@ -379,18 +380,18 @@ TEST(Structures, ABoardThatFallsOnAHeapIsNotThrownUpOutOfStep) {
         }
         Moved record;
         const sim::DistributedResult result =
-            sim::simulate_processors(scene, bounded(120, 4), processors(5), record);
+            sim_bench::simulate_processors(scene, bounded(120, 4), processors(5), record);
         EXPECT_EQ(result.steps, 120u);
         EXPECT_EQ(result.trades, 0u);
         EXPECT_TRUE(result.one_owner);
         EXPECT_LT(record.fastest, 5);  // falls by 0.35 m: 2.6 m/s, and slides down
         // Whoever leaves, also before the board comes: all bodies go to one other worker.
-        sim::SimulatedProcessors how = processors(5);
+        sim_bench::SimulatedProcessors how = processors(5);
         for (int worker = 0; worker < 4; ++worker)
             how.failures.push_back({result.elapsed_s * (worker + 1) / 24, worker,
-                                    sim::SimulatedProcessors::Failure::Kind::drain});
+                                    sim_bench::SimulatedProcessors::Failure::Kind::drain});
         Moved drained;
-        EXPECT_EQ(sim::simulate_processors(scene, bounded(120, 4), how, drained).steps, 120u);
+        EXPECT_EQ(sim_bench::simulate_processors(scene, bounded(120, 4), how, drained).steps, 120u);
         EXPECT_EQ(drained.own[4], 76);
         EXPECT_LT(drained.fastest, 5);
     }

@@ -15,7 +15,7 @@
 #include "shared_scenes.h"
 
 using namespace world_test;
-using Failure = sim::SimulatedProcessors::Failure;
+using Failure = sim_bench::SimulatedProcessors::Failure;
 using Kind = Failure::Kind;
 
 namespace {
@@ -31,8 +31,8 @@ sim::DistributedSettings trading() {
     return settings;
 }
 
-sim::SimulatedProcessors processors() {
-    sim::SimulatedProcessors how;
+sim_bench::SimulatedProcessors processors() {
+    sim_bench::SimulatedProcessors how;
     how.count = kWorkers;
     how.modelled = true;
     return how;
@@ -70,17 +70,17 @@ TEST(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFinis
     const sim::WorldScene scene = busy_scene();
     const sim::DistributedSettings settings = trading();
     Record whole;
-    const auto unharmed = sim::simulate_processors(scene, settings, processors(), whole);
+    const auto unharmed = sim_bench::simulate_processors(scene, settings, processors(), whole);
     ASSERT_GE(unharmed.trades, 2u);
     EXPECT_EQ(unharmed.refused_messages, 0u) << whole.notes;
     const double silence = unharmed.elapsed_s / 8;
     std::uint64_t reowned = 0;
     for (const std::vector<Failure>& some : failures(unharmed.elapsed_s, silence)) {
-        sim::SimulatedProcessors how = processors();
+        sim_bench::SimulatedProcessors how = processors();
         how.silence_s = silence;
         how.failures = some;
         Record record;
-        const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+        const sim::DistributedResult result = sim_bench::simulate_processors(scene, settings, how, record);
         SCOPED_TRACE(std::to_string(static_cast<int>(some[0].kind)) + " of " +
                      std::to_string(some[0].worker) + " at " + std::to_string(some[0].time_s));
         EXPECT_EQ(result.steps, kSteps);
@@ -107,7 +107,7 @@ TEST(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAnd
         SCOPED_TRACE("seed " + std::to_string(seed));
         std::mt19937 random(seed + 1);
         auto uniform = [&random] { return static_cast<double>(random()) / 4294967296.0; };
-        sim::SimulatedProcessors how = processors();
+        sim_bench::SimulatedProcessors how = processors();
         how.count = 1 + static_cast<int>(random() % 5);
         how.latency_s = 1e-5 * std::pow(30, uniform());
         settings.all_to_first = seed % 2 == 0;
@@ -128,7 +128,8 @@ TEST(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAnd
         // A stopped processor is either lost or goes on.
         Record record;
         sim::DistributedResult result;
-        ASSERT_NO_THROW(result = sim::simulate_processors(scene, settings, how, record)) << record.notes;
+        ASSERT_NO_THROW(result = sim_bench::simulate_processors(scene, settings, how, record))
+            << record.notes;
         EXPECT_EQ(result.steps, settings.steps);
         EXPECT_TRUE(record.in_order);
         const int own = std::accumulate(record.own.begin(), record.own.end(), 0,
@@ -221,16 +222,17 @@ TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
     for (const int bound : {0, 1, 4, 16})
         for (const int leave : {1, 2, 3}) {
             settings.bound = bound;
-            sim::SimulatedProcessors how = processors();
+            sim_bench::SimulatedProcessors how = processors();
             how.count = 4;
             Record unharmed;
-            const double whole = sim::simulate_processors(scene, settings, how, unharmed).elapsed_s;
+            const double whole = sim_bench::simulate_processors(scene, settings, how, unharmed).elapsed_s;
             for (int k = 0; k < leave; ++k)  // at once, or one after the other
                 how.failures.push_back(
                     {whole * (0.2 + 0.17 * k * (bound % 4)), (bound + k) % how.count, Kind::drain});
             if (leave == 2) how.failures.push_back({0.5 * whole, 0, Kind::join});
             MomentumRecord record;
-            const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+            const sim::DistributedResult result =
+                sim_bench::simulate_processors(scene, settings, how, record);
             SCOPED_TRACE(std::to_string(leave) + " leave, bound " + std::to_string(bound) + record.notes);
             EXPECT_EQ(result.steps, settings.steps);
             EXPECT_EQ(result.left, leave);
@@ -331,7 +333,7 @@ TEST(Leaving, AndJoiningOutOfStepKeepTheMomentumOfBallsThatRebound) {
             settings.bound = std::array{0, 1, 2, 4, 8, 16, 32, 64}[random() % 8];
             settings.market.from_step = 3;
             settings.all_to_first = random() % 3 == 0;
-            sim::SimulatedProcessors how = processors(2 + static_cast<int>(random() % 5));
+            sim_bench::SimulatedProcessors how = processors(2 + static_cast<int>(random() % 5));
             how.latency_s = 1e-5 * std::pow(30, share());
             how.silence_s = 1e3;
             how.factor = [seed](int worker, std::uint64_t step) {
@@ -345,7 +347,8 @@ TEST(Leaving, AndJoiningOutOfStepKeepTheMomentumOfBallsThatRebound) {
                     {0.06 * share(), static_cast<int>(random() % static_cast<unsigned>(how.count)), kind});
             }
             MomentumRecord record;
-            const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+            const sim::DistributedResult result =
+                sim_bench::simulate_processors(scene, settings, how, record);
             SCOPED_TRACE("seed " + std::to_string(seed) + (leave ? ", some leave: " : ": ") + record.notes);
             EXPECT_EQ(result.steps, settings.steps);
             EXPECT_EQ(result.lost, 0);

@@ -1,8 +1,8 @@
 #include <chrono>
 
-#include "shared/scene_clock.h"
+#include "run/processor_time.h"
+#include "run/scene_clock.h"
 #include "sim/distributed_world.h"
-#include "world/processor_time.h"
 
 namespace sim {
 namespace {

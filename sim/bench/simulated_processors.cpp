@@ -1,3 +1,5 @@
+#include "simulated_processors.h"
+
 #include <algorithm>
 #include <cstdint>
 #include <deque>
@@ -8,14 +10,15 @@
 #include <string>
 #include <utility>
 
+#include "run/processor_time.h"
 #include "shared/coordinator.h"
 #include "shared/shared_world_worker.h"
-#include "sim/distributed_world.h"
 #include "sim/errors.h"
-#include "world/processor_time.h"
 
-namespace sim {
+namespace sim_bench {
 namespace {
+
+using namespace sim;
 
 using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 
@@ -83,7 +86,7 @@ public:
                          [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
     }
 
-    DistributedResult run();
+    SimulatedResult run();
 
 private:
     struct Event {
@@ -103,7 +106,7 @@ private:
     [[nodiscard]] Turn turn_of(Processor& p);
     void start_step(std::size_t number);
     [[nodiscard]] double repeat_alone(const Processor& p) const;
-    void repeat_alone(DistributedResult& result) const;
+    void repeat_alone(SimulatedResult& result) const;
     void send(Processor& p);
     [[nodiscard]] double factor(std::size_t number) const;
     [[nodiscard]] std::string stuck() const;
@@ -275,7 +278,7 @@ double Machine::repeat_alone(const Processor& p) const {
     return spent;
 }
 
-void Machine::repeat_alone(DistributedResult& result) const {
+void Machine::repeat_alone(SimulatedResult& result) const {
     double in_turns = 0, sum = 0, longest = 0;
     for (const Processor& p : processors_) {
         const double alone = repeat_alone(p);
@@ -302,7 +305,7 @@ std::string Machine::stuck() const {
     return what;
 }
 
-DistributedResult Machine::run() {
+SimulatedResult Machine::run() {
     for (int i = 0; i < how_.count; ++i) join();
     meeting_.start();
     deliver();
@@ -311,7 +314,7 @@ DistributedResult Machine::run() {
         if (event.kind == Event::Kind::none) throw std::logic_error(stuck());
         happen(event);
     }
-    DistributedResult result = meeting_.result();
+    SimulatedResult result{meeting_.result()};
     result.elapsed_s = std::max(0.0, ended_ - std::max(0.0, started_));
     if (how_.repeat_alone) repeat_alone(result);
     return result;
@@ -319,10 +322,10 @@ DistributedResult Machine::run() {
 
 }  // namespace
 
-DistributedResult simulate_processors(const WorldScene& scene, const DistributedSettings& settings,
-                                      const SimulatedProcessors& processors, DistributedObserver& observer) {
+SimulatedResult simulate_processors(const WorldScene& scene, const DistributedSettings& settings,
+                                    const SimulatedProcessors& processors, DistributedObserver& observer) {
     if (processors.count < 1) throw InputError("", "no processor", "1 or more");
     return Machine(scene, settings, processors, observer).run();
 }
 
-}  // namespace sim
+}  // namespace sim_bench

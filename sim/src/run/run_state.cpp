@@ -2,10 +2,10 @@
 #include <cmath>
 #include <string>
 
-#include "messages/world_record_codec.h"
-#include "shared/scene_clock.h"
-#include "sim/errors.h"
 #include "contact/manifold.h"
+#include "messages/world_record_codec.h"
+#include "run/scene_clock.h"
+#include "sim/errors.h"
 
 namespace sim {
 namespace {
