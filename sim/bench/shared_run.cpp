@@ -58,7 +58,7 @@ double drawn(std::uint64_t a, std::uint64_t b) {
 double SharedRun::critical_path_s(int lead) const {
     std::map<std::uint64_t, std::map<int, double>> costs;
     for (const sim::WorkerStep& s : steps) {
-        double& cost = costs[s.step][s.worker];  // of a step that is told twice the longer one
+        double& cost = costs[s.step][s.worker];  // if a step is reported twice, the longer time
         cost = std::max(cost, s.processor_s);
     }
     std::map<int, double> ended;    // by each worker's last step

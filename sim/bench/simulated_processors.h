@@ -6,8 +6,8 @@
 
 namespace sim_bench {
 
-/// Workers in this process. Each has a clock of its own, which advances by the cost of its work once it has the scene. Events
-/// happen in the order of simulated time.
+/// Workers in this process. Each has a clock of its own, which advances by the cost of its work once it has
+/// the scene. Events happen in the order of simulated time.
 struct SimulatedProcessors {
     int count = 1;
     /// From worker to worker, by way of the application: half of it to there, half from there.
@@ -16,9 +16,9 @@ struct SimulatedProcessors {
     bool modelled =
         false;  ///< costs are counted (World::work), not measured: results are a pure function of the input
     double seconds_per_work = 2e-6;  ///< modelled: of one unit of work, times slowdown
-    /// Workers that take turns in one thread find their caches cold; on a processor of their own they would not. So each worker
-    /// repeats all its work alone afterwards, and SimulatedResult::cold_caches says how much faster that is. This is
-    /// measured even if costs are modelled. Every message is kept for it.
+    /// Workers that take turns in one thread find their caches cold; on a processor of their own they would
+    /// not. So each worker repeats all its work alone afterwards, and SimulatedResult::cold_caches says how
+    /// much faster that is. This is measured even if costs are modelled. Every message is kept for it.
     bool repeat_alone = false;
     /// A further factor of a worker's step, such as a straggler's; empty: none.
     std::function<double(int worker, std::uint64_t step)> factor;
@@ -33,8 +33,8 @@ struct SimulatedProcessors {
 };
 
 struct SimulatedResult : sim::DistributedResult {
-    /// With repeat_alone: the workers' processor time in turns over their processor time alone. As far as elapsed_s is
-    /// work, it is too long by this factor.
+    /// With repeat_alone: the workers' processor time in turns over their processor time alone. As far as
+    /// elapsed_s is work, it is too long by this factor.
     double cold_caches = 1;
     double busiest_s =
         0;  ///< with repeat_alone: time of the worker that takes longest alone, by the run's clock

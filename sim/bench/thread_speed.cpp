@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <chrono>
 
-#include "run/processor_time.h"
+#include "run/elapsed_time.h"
 
 namespace sim_bench {
 namespace {
 
 constexpr int kTurn = 25;  // steps
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 double median_of(std::vector<double> values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -28,10 +22,10 @@ struct Threaded {
         world.use_threads(threads);
     }
     void step(int steps) {
-        const Clock::time_point start = Clock::now();
+        const auto start = std::chrono::steady_clock::now();
         const double all = sim::process_processor_s();
         for (int i = 0; i < steps; ++i) world.step();
-        sum.elapsed_s += seconds_since(start);
+        sum.elapsed_s += sim::seconds_since(start);
         sum.cpu_s += sim::process_processor_s() - all;
     }
 

@@ -34,7 +34,7 @@ public:
         }
         inbox_.resize(static_cast<std::size_t>(workers)), outbox_.resize(inbox_.size()),
             waits_.resize(inbox_.size());
-        for (auto& e : exchanges_) e->members({members}, 0);
+        for (auto& e : exchanges_) e->set_members({members}, 0);
         for (int w = 0; w < workers; ++w) {
             Ownership ownership;
             ownership.owner = static_cast<std::uint32_t>(w);
@@ -42,7 +42,7 @@ public:
                 if (owner[b] == w)
                     ownership.bodies.push_back(exchanges_[0]->world().record(static_cast<int>(b)));
             ++epoch_;
-            for (auto& e : exchanges_) e->own(ownership, epoch_);
+            for (auto& e : exchanges_) e->set_owner(ownership, epoch_);
         }
         for (int w = 0; w < workers; ++w) known_epoch_[static_cast<std::size_t>(w)] = epoch_;
     }
@@ -68,13 +68,13 @@ public:
         if (found == agreed_.end() || waits_[seller] > 0) return false;
         const auto [buyer, body, step] = found->second;
         if (exchanges_[seller]->steps_done() < step || exchanges_[buyer]->steps_done() < step ||
-            !exchanges_[seller]->may_give())
+            !exchanges_[seller]->may_hand_over())
             return false;
         agreed_.erase(found);
         if (!exchanges_[seller]->world().own(body) || exchanges_[seller]->at_end() ||
             exchanges_[seller]->own_bodies() == 1)
             return false;
-        const Handover sold = exchanges_[seller]->give({static_cast<std::uint32_t>(body)});
+        const Handover sold = exchanges_[seller]->hand_over({static_cast<std::uint32_t>(body)});
         Ownership ownership;
         ownership.owner = static_cast<std::uint32_t>(buyer),
         ownership.from = static_cast<std::uint32_t>(seller);
@@ -192,15 +192,15 @@ private:
         inbox_[w].pop_front();
         if (sent.sold) {
             known_epoch_[w] = sent.epoch;
-            exchanges_[w]->own(*sent.sold, sent.epoch);
+            exchanges_[w]->set_owner(*sent.sold, sent.epoch);
             if (w == sent.sold->from || w == sent.sold->owner) --waits_[w];
             return;
         }
         DecodedMessage message = decode_message(sent.bytes);
         if (auto* told = std::get_if<NeighbourMessage>(&message.message))
-            exchanges_[w]->take(message.header, std::move(*told));
+            exchanges_[w]->receive(message.header, std::move(*told));
         else
-            exchanges_[w]->take(message.header, std::get<FoundMessage>(std::move(message.message)));
+            exchanges_[w]->receive(message.header, std::get<FoundMessage>(std::move(message.message)));
     }
     void publish(const DecodedMessage& message) {
         const auto* update = std::get_if<UpdateMessage>(&message.message);
@@ -503,15 +503,15 @@ TEST(BoundedExchange, NobodyBeginsBeforeAllOwnersAreKnown) {
     scene.settings.bound = 1, scene.settings.steps = 100;
     const auto exchange = std::make_unique<BoundedExchange>(scene);
     exchange->send_by([](auto&&) {});
-    exchange->members({{0, 1}, true}, 1);
+    exchange->set_members({{0, 1}, true}, 1);
     for (const std::uint32_t owner : {0u, 1u}) {
         Ownership ownership;
         ownership.owner = owner;
         ownership.bodies = {exchange->world().record(static_cast<int>(owner))};
-        exchange->own(ownership, owner + 1);
+        exchange->set_owner(ownership, owner + 1);
         EXPECT_FALSE(exchange->ready());
     }
-    exchange->members({{0, 1}, false}, 3);
+    exchange->set_members({{0, 1}, false}, 3);
     int steps = 0;
     for (; exchange->ready() && steps < 100; ++steps) exchange->step();
     EXPECT_EQ(steps, 2);  // one ahead of who has done none, and then waits

@@ -20,7 +20,7 @@ public:
         sim::MarketSettings settings;
         std::vector<std::uint32_t> members;
         for (int i = 0; i < workers; ++i) members.push_back(static_cast<std::uint32_t>(i));
-        for (const std::uint32_t i : members) markets_.emplace_back(i, settings, 0).members(members);
+        for (const std::uint32_t i : members) markets_.emplace_back(i, settings, 0).set_members(members);
         for (int p = 0; p < piles; ++p)
             for (int x = 0; x < wide; ++x)
                 for (int y = 0; y < deep; ++y) columns.push_back({x + 1000 * p, y});
@@ -58,12 +58,13 @@ public:
         for (std::uint32_t w = 0; w < markets_.size(); ++w) {
             sim::Market& market = markets_[w];
             const double work = seconds(w) / speed[w];
-            if (own(w) > 0) market.worked(step_, seconds(w), work, own(w));
+            if (own(w) > 0) market.end_step(step_, seconds(w), work, own(w));
             sim::StepReport report;
             report.smoothed_s = static_cast<float>(market.smoothed());
             report.own = static_cast<std::uint32_t>(own(w));
             for (std::uint32_t other = 0; own(w) > 0 && other < markets_.size(); ++other)
-                if (other != w) markets_[other].heard({w, epoch_, step_}, report.smoothed_s, report.own);
+                if (other != w)
+                    markets_[other].receive_report({w, epoch_, step_}, report.smoothed_s, report.own);
         }
         for (std::uint32_t w = 0; w < markets_.size(); ++w) {
             if (!markets_[w].wants_to_sell()) continue;
@@ -72,7 +73,7 @@ public:
             offered = *offer;
             const sim::OfferAnswer answer = markets_[offer->to].answer(w, *offer);
             EXPECT_TRUE(answer.accepted) << "step " << step_ << ", " << w << " to " << offer->to;
-            markets_[w].answered(offer->to, {w, offer->number, answer.accepted});
+            markets_[w].receive_answer(offer->to, {w, offer->number, answer.accepted});
             if (!markets_[w].hand_over()) continue;
             sim::Ownership ownership;
             ownership.owner = offer->to, ownership.from = w, ownership.traded = true, ownership.step = step_;
@@ -81,7 +82,7 @@ public:
                 ownership.bodies.emplace_back().body = static_cast<int>(body);
             }
             ++epoch_;
-            for (sim::Market& market : markets_) market.registered(epoch_, ownership);
+            for (sim::Market& market : markets_) market.register_sale(epoch_, ownership);
             sold += static_cast<int>(offer->bodies.size());
         }
         return sold;

@@ -185,12 +185,11 @@ TEST(Structures, ThatEventsCompleteArePlannedUntilAllHasCome) {
     scene.world.bodies.pop_back();
     for (const bool shower : {false, true}) {
         if (shower) scene.later.assign(3, box({0, 9, 0}, {0.5, 0.5, 0.5}));
-        const sim::PlannedStructures planned(scene, 1, 0.2);
-        for (const int there : {4, 5}) {
-            Bodies found = {{7}};
-            planned.add_unfinished(there, found);
-            EXPECT_EQ(found, (!shower && there == 4 ? Bodies{{7}, {0, 1, 2, 3, 4}} : Bodies{{7}}));
-        }
+        const sim::StructureFinder finder(scene, 1, 0.2);
+        sim::SharedWorld world(scene.world);
+        EXPECT_EQ(finder.flat(world, {}), (shower ? Bodies{} : Bodies{{0, 1, 2, 3, 4}}));
+        for (const sim::WorldBody& body : scene.later) (void)world.add_body(body);
+        EXPECT_TRUE(finder.flat(world, {}).empty());
     }
 }
 

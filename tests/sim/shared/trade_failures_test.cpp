@@ -154,33 +154,33 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
             sim::DistributedSettings settings = for_steps(20);
             settings.market.trade = false;
             Record record;
-            sim::Coordinator meeting(scene, settings, record);
+            sim::Coordinator coordinator(scene, settings, record);
             std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
-            for (int i = 0; i < 3; ++i) (void)meeting.join({});
+            for (int i = 0; i < 3; ++i) (void)coordinator.join({});
             const auto deliver = [&] {
-                for (const sim::Coordinator::Outgoing& out : meeting.outgoing())
+                for (const sim::Coordinator::Outgoing& out : coordinator.outgoing())
                     for (const std::uint32_t to : out.to) {
                         sim::DecodedMessage m = sim::decode_message(*out.bytes);
                         if (const auto* with = std::get_if<sim::SceneMessage>(&m.message))
                             workers[to] = std::make_unique<sim::SharedWorldWorker>(*with);
                         else
-                            workers.at(to)->take(m.header, std::move(m.message));
+                            workers.at(to)->receive(m.header, std::move(m.message));
                     }
             };
             const auto send = [&](std::uint32_t number) {
                 for (const std::vector<std::uint8_t>& bytes : workers.at(number)->outgoing())
-                    meeting.take(number, bytes), meeting.advance();
+                    coordinator.receive(number, bytes), coordinator.advance();
             };
             deliver();
-            meeting.start();
-            const std::uint32_t first = meeting.owner(0);
+            coordinator.start();
+            const std::uint32_t first = coordinator.owner(0);
             bool gone = false;
-            for (int turn = 0; turn < 200 && !meeting.finished(); ++turn) {
+            for (int turn = 0; turn < 200 && !coordinator.finished(); ++turn) {
                 deliver();
                 for (auto& [number, worker] : workers) {
                     const bool waits = number != first && !gone && worker->steps_done() >= 17;
                     if ((number == first && gone && !drains) || waits) continue;
-                    if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3});
+                    if (worker->ready()) worker->step(), worker->end_step({.seconds = 1e-3});
                     send(number);
                 }
                 if (gone || workers.at(first)->steps_done() < 20) continue;
@@ -188,13 +188,13 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
                 if (drains)
                     workers.at(first)->drain(), send(first);
                 else
-                    meeting.lose(first, "killed");
+                    coordinator.lose(first, "killed");
             }
             EXPECT_TRUE(gone);
-            EXPECT_TRUE(meeting.finished()) << record.notes;
-            EXPECT_EQ(meeting.steps(), 20u);
-            EXPECT_EQ(meeting.result().lost, drains ? 0 : 1) << record.notes;
-            EXPECT_EQ(meeting.result().refused_messages, 0u) << record.notes;
+            EXPECT_TRUE(coordinator.finished()) << record.notes;
+            EXPECT_EQ(coordinator.steps(), 20u);
+            EXPECT_EQ(coordinator.result().lost, drains ? 0 : 1) << record.notes;
+            EXPECT_EQ(coordinator.result().refused_messages, 0u) << record.notes;
         }
 }
 
@@ -251,7 +251,7 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
         sim::DistributedSettings settings = for_steps(120);
         settings.bound = 16;
         MomentumRecord record;
-        sim::Coordinator meeting(scene, settings, record);
+        sim::Coordinator coordinator(scene, settings, record);
         std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
         std::deque<std::pair<std::size_t, std::vector<std::uint8_t>>> late;  // of worker 0, by rounds
         std::size_t round = 0;
@@ -259,15 +259,15 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
             for (bool more = true; more;) {
                 more = false;
                 for (; !late.empty() && late.front().first <= round; late.pop_front())
-                    meeting.take(0, late.front().second), meeting.advance();
-                for (const sim::Coordinator::Outgoing& out : meeting.outgoing())
+                    coordinator.receive(0, late.front().second), coordinator.advance();
+                for (const sim::Coordinator::Outgoing& out : coordinator.outgoing())
                     for (const std::uint32_t to : out.to) {
                         more = true;
                         sim::DecodedMessage message = sim::decode_message(*out.bytes);
                         if (const auto* of = std::get_if<sim::SceneMessage>(&message.message))
                             workers[to] = std::make_unique<sim::SharedWorldWorker>(*of);
                         else
-                            workers.at(to)->take(message.header, std::move(message.message));
+                            workers.at(to)->receive(message.header, std::move(message.message));
                     }
                 for (auto& [number, worker] : workers)
                     for (std::vector<std::uint8_t>& bytes : worker->outgoing()) {
@@ -275,26 +275,26 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
                         if (number == 0)
                             late.emplace_back(round + late_by, std::move(bytes));
                         else
-                            meeting.take(number, bytes), meeting.advance();
+                            coordinator.receive(number, bytes), coordinator.advance();
                     }
             }
         };
-        for (int i = 0; i < 3; ++i) (void)meeting.join({});
+        for (int i = 0; i < 3; ++i) (void)coordinator.join({});
         deliver();
         workers.at(0)->drain();
         deliver();
-        meeting.start();
-        for (; !meeting.finished() && round < 2000; ++round) {
+        coordinator.start();
+        for (; !coordinator.finished() && round < 2000; ++round) {
             deliver();
             for (auto& [number, worker] : workers)
-                if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3});
+                if (worker->ready()) worker->step(), worker->end_step({.seconds = 1e-3});
         }
         SCOPED_TRACE(std::to_string(late_by) + " rounds late: " + record.notes);
-        EXPECT_EQ(meeting.result().left, 1);
-        EXPECT_EQ(meeting.result().lost, 0);
-        EXPECT_EQ(meeting.steps(), 120u);
+        EXPECT_EQ(coordinator.result().left, 1);
+        EXPECT_EQ(coordinator.result().lost, 0);
+        EXPECT_EQ(coordinator.steps(), 120u);
         const double weight = weight_of(sim::World(scene.world));
-        EXPECT_LT((record.momentum - meeting.result().outside_impulse).norm(), 1e-9 * weight * 120 / 60);
+        EXPECT_LT((record.momentum - coordinator.result().outside_impulse).norm(), 1e-9 * weight * 120 / 60);
     }
 }
 
