@@ -135,8 +135,7 @@ bool Coordinator::is_valid(const std::vector<Mishap>& mishaps) const {
     });
 }
 
-// Whether a worker may make this offer. The market may have lost a body, or have an offer that is not
-// answered.
+// Whether a worker may make this offer now. Its bodies may have changed owners since it wrote the offer.
 bool Coordinator::may_offer(std::uint32_t worker, const Offer& offer) const {
     const auto& before = senders_.at(worker).offer;
     const bool is_answered = !before || !is_member(before->first);
