@@ -50,5 +50,5 @@ floors() {
 }
 floors app statistics files process report scene kit sticks strikes pictures sensors play traces simulate compare latency realtime commands
 floors tracking trace drummer filter learned
-floors sim bytes shape modes struck body contact solver world messages shared workers
+floors sim bytes shape modes struck body contact solver world messages run accuracy shared workers
 exit $status

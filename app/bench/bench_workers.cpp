@@ -3,9 +3,7 @@
 #include <falling_bodies.h>
 #include <fmt/format.h>
 #include <shared_run.h>
-#include <struck_speed.h>
 #include <thread_speed.h>
-#include <update_throughput.h>
 
 #include <algorithm>
 #include <array>
@@ -164,7 +162,7 @@ public:
         sim::DistributedSettings settings = settings_of(500, options_.bound, true);
         settings.all_to_first = scene.workers.all_to_first;
         settings.market.from_step = scene.workers.balance_from;
-        sim::SimulatedProcessors processors = options_.processors;
+        sim_bench::SimulatedProcessors processors = options_.processors;
         processors.count = 3;
         const SharedRun run = sim_bench::measure_run(scene, settings, processors);
         const std::uint64_t from = scene.workers.balance_from, load = scene.events.at(0).step;
@@ -215,61 +213,8 @@ public:
             options_.steps, options_.rounds, cores()));
     }
 
-    /// Struck bodies, as in `play --workers`.
-    void kit() {
-        std::vector<int> counts = {0};
-        for (const int workers : options_.workers)
-            if (workers <= cores()) counts.push_back(workers);
-        const sim::WorkerLaunch launch = {options_.program, {"worker"}};
-        for (const int bodies : {10, 100}) {
-            progress_(fmt::format("kit of {} drums", bodies));
-            const auto all = sim_bench::measure_struck(bodies, counts, launch, 4 * options_.steps);
-            for (const sim_bench::StruckSpeed& speed : all) {
-                const std::string name = fmt::format("kit_bodies{}_workers{}", bodies, speed.workers);
-                add(name + "_step", 1e6 * speed.step_s, "us of two strokes");
-                add(name + "_speed_up", all.front().step_s / speed.step_s, "times one process");
-                add(name + "_critical_path", 1e6 * speed.critical_path_s, "us of two strokes");
-                add(name + "_critical_path_speed_up", all.front().critical_path_s / speed.critical_path_s,
-                    "times one process");
-            }
-        }
-        note(fmt::format(
-            "kit: {} steps of 1/60 s, in each two strokes on drums and two pictures; 0 workers: in this "
-            "process. Step: median by the wall clock. Critical path: processor time of the application's "
-            "thread and of the worker that used most.",
-            4 * options_.steps));
-    }
-
-    /// Messages of all bodies, as many as pass in two seconds.
-    void throughput() {
-        struct Route {
-            const char* name;
-            bool keys, through_application;
-        };
-        for (const Route& route : {Route{"curve_one_hop", true, false},
-                                   {"curve_through_application", true, true},
-                                   {"plain_through_application", false, true}}) {
-            progress_(fmt::format("throughput: {}", route.name));
-            sim_bench::ThroughputSettings settings;
-            settings.bodies = most_bodies_;
-            settings.keys = route.keys, settings.through_application = route.through_application;
-            const sim_bench::Throughput t = sim_bench::measure_update_throughput(settings);
-            const std::string name = fmt::format("tcp_{}", route.name);
-            add(name + "_updates", 1e-6 * t.updates_per_s, "million bodies a second");
-            add(name + "_cpu", t.cpu_ns_per_update, "ns a body, all threads");
-            if (!route.keys) continue;
-            add(name + "_bytes_per_update", t.bytes_per_update, "bytes");
-            add(name + "_encode", t.encode_ns, "ns a body");
-            add(name + "_decode", t.decode_ns, "ns a body");
-        }
-        note(fmt::format(
-            "throughput: quantised states of {} modes over tcp on this machine, {} bodies a message, "
-            "encoded by one thread, checked and decoded by another; CURVE encrypts and authenticates.",
-            kModes, most_bodies_));
-    }
-
     void note_clock() {
-        const sim::SimulatedProcessors& p = options_.processors;
+        const sim_bench::SimulatedProcessors& p = options_.processors;
         note(fmt::format(
             "Clock of speedup, stragglers, bound and migration: simulated processors; costs {}, {} times "
             "slower than here; {:g} s from worker to worker; events in simulated order in one thread. {} "
@@ -289,7 +234,7 @@ private:
     };
     SharedRun measure(const sim::WorldScene& scene, int workers, const Way& way,
                       sim::DistributedObserver* also = nullptr) {
-        sim::SimulatedProcessors processors = options_.processors;
+        sim_bench::SimulatedProcessors processors = options_.processors;
         processors.count = workers;
         processors.factor = way.factor;
         processors.repeat_alone = way.warm && !processors.modelled;
@@ -300,7 +245,7 @@ private:
     void speed_up(int bodies) {
         const sim::WorldScene scene = scene_of(bodies);
         const auto run_of = [](const SharedRun& run) {
-            const sim::DistributedResult& r = run.result;
+            const sim_bench::SimulatedResult& r = run.result;
             return SpeedUp::Run{r.elapsed_s / r.cold_caches, r.cold_caches, r.busiest_s};
         };
         SpeedUp speed_up;
@@ -392,8 +337,7 @@ private:
 const std::vector<std::pair<std::string, void (WorkersBenchRun::*)()>> kParts = {
     {"speedup", &WorkersBenchRun::speed_ups}, {"stragglers", &WorkersBenchRun::stragglers},
     {"bound", &WorkersBenchRun::bounds},      {"migration", &WorkersBenchRun::migration},
-    {"threads", &WorkersBenchRun::threads},   {"processes", &WorkersBenchRun::processes},
-    {"kit", &WorkersBenchRun::kit},           {"throughput", &WorkersBenchRun::throughput}};
+    {"threads", &WorkersBenchRun::threads},   {"processes", &WorkersBenchRun::processes}};
 
 constexpr int kWidth = 960, kHeight = 380;
 

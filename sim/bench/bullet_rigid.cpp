@@ -7,8 +7,8 @@
 namespace sim_bench {
 namespace {
 
-/// Half extents of the slab that stands for a plane, in those of the scene: single precision knows a small body
-/// on it the better the smaller it is.
+/// Half extents of the slab that stands for a plane, in those of the scene: single precision knows a small
+/// body on it the better the smaller it is.
 constexpr double kSlab = 20, kSlabThickness = 2;
 
 constexpr const char* kManyIterations = "50 iterations, full warm start";  // what stacks need

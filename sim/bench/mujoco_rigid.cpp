@@ -25,8 +25,8 @@ std::string attribute(const char* name, const std::string& value) {
     return std::string(" ") + name + "=\"" + value + "\"";
 }
 
-/// A world as MuJoCo's XML. Bodies that hang together without a loop become a tree of ball joints, so that the
-/// joints hold exactly; what closes a loop is an equality.
+/// A world as MuJoCo's XML. Bodies that hang together without a loop become a tree of ball joints, so that
+/// the joints hold exactly; what closes a loop is an equality.
 class Description {
 public:
     Description(const sim::WorldDefinition& world, const PeerSettings& settings)
@@ -216,8 +216,8 @@ public:
     }
 
 private:
-    /// Free: linear in world axes, angular in the body's; a ball joint: angular in the body's, which is all of
-    /// it where the parent does not turn.
+    /// Free: linear in world axes, angular in the body's; a ball joint: angular in the body's, which is all
+    /// of it where the parent does not turn.
     void set_velocity(const sim::WorldBody& body, int id) {
         mjtNum* const v = data_->qvel + model_->body_dofadr[id];
         const bool free = model_->body_dofnum[id] == 6;

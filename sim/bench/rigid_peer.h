@@ -46,7 +46,7 @@ struct PeerLibrary {
     std::unique_ptr<RigidPeer> (*make)(const sim::WorldDefinition& world, const PeerSettings& settings);
 };
 
-/// Those that are there.
+/// The peers whose libraries are installed.
 [[nodiscard]] std::vector<PeerLibrary> rigid_peers();
 
 // One file for each library, or one without it, which returns false.

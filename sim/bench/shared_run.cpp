@@ -58,7 +58,7 @@ double drawn(std::uint64_t a, std::uint64_t b) {
 double SharedRun::critical_path_s(int lead) const {
     std::map<std::uint64_t, std::map<int, double>> costs;
     for (const sim::WorkerStep& s : steps) {
-        double& cost = costs[s.step][s.worker];  // of a step that is told twice the longer one
+        double& cost = costs[s.step][s.worker];  // if a step is reported twice, the longer time
         cost = std::max(cost, s.processor_s);
     }
     std::map<int, double> ended;    // by each worker's last step
@@ -77,22 +77,22 @@ double SharedRun::critical_path_s(int lead) const {
 }
 
 SharedRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
-                      const sim::SimulatedProcessors& processors, sim::DistributedObserver* also) {
+                      const SimulatedProcessors& processors, sim::DistributedObserver* also) {
     return measure(scene, settings, also, [&](sim::DistributedObserver& observer) {
-        return sim::simulate_processors(scene, settings, processors, observer);
+        return simulate_processors(scene, settings, processors, observer);
     });
 }
 
 SharedRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
                       const sim::DistributedLaunch& launch) {
     return measure(scene, settings, nullptr, [&](sim::DistributedObserver& observer) {
-        return sim::run_distributed(scene, settings, launch, observer);
+        return SimulatedResult{sim::run_distributed(scene, settings, launch, observer)};
     });
 }
 
 SharedRun measure_alone(const sim::WorldScene& scene, const sim::DistributedSettings& settings) {
     return measure(scene, settings, nullptr, [&](sim::DistributedObserver& observer) {
-        return sim::run_alone(scene, settings, observer);
+        return SimulatedResult{sim::run_alone(scene, settings, observer)};
     });
 }
 

@@ -5,30 +5,32 @@
 #include <cstdint>
 #include <vector>
 
+#include "simulated_processors.h"
+
 namespace sim_bench {
 
-/// A distributed run and what was seen of it.
+/// A distributed run with its observed steps and trades.
 struct SharedRun {
     struct Trade {
         std::uint64_t step;
         int bodies, from, to;
     };
-    sim::DistributedResult result;
-    std::vector<sim::WorkerStep> steps;  ///< as told
+    SimulatedResult result;  ///< without simulated processors, cold_caches and busiest_s are not set
+    std::vector<sim::WorkerStep> steps;  ///< as reported
     std::vector<Trade> trades;
     std::vector<Eigen::Vector3d> after_a_second;  ///< centres
     double mean_height = 0;                       ///< of centres at the end [m]
     std::uint64_t body_steps = 0;
 
-    /// What the same steps would take by processor time, messages included, if each worker had a processor of its own
-    /// and began step s when all had ended step s - 1 - lead [s]. 0: a barrier after each step, so the sum of the
-    /// longest.
+    /// What the same steps would take by processor time, messages included, if each worker had a processor of
+    /// its own and began step s when all had ended step s - 1 - lead [s]. 0: a barrier after each step, so
+    /// the sum of the longest.
     [[nodiscard]] double critical_path_s(int lead = 0) const;
 };
 
-/// `also` is told, too.
+/// `also` gets all calls, too.
 [[nodiscard]] SharedRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
-                                    const sim::SimulatedProcessors& processors,
+                                    const SimulatedProcessors& processors,
                                     sim::DistributedObserver* also = nullptr);
 [[nodiscard]] SharedRun measure_run(const sim::WorldScene& scene, const sim::DistributedSettings& settings,
                                     const sim::DistributedLaunch& launch);

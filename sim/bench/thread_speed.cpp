@@ -1,13 +1,20 @@
 #include "thread_speed.h"
 
 #include <algorithm>
+#include <chrono>
 
-#include "bench_clock.h"
+#include "run/elapsed_time.h"
 
 namespace sim_bench {
 namespace {
 
 constexpr int kTurn = 25;  // steps
+
+double median_of(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return values.empty() ? 0 : *middle;
+}
 
 /// A world with so many threads.
 struct Threaded {
@@ -15,10 +22,11 @@ struct Threaded {
         world.use_threads(threads);
     }
     void step(int steps) {
-        const double wall = wall_s(), all = process_cpu_s();
+        const auto start = std::chrono::steady_clock::now();
+        const double all = sim::process_processor_s();
         for (int i = 0; i < steps; ++i) world.step();
-        sum.elapsed_s += wall_s() - wall;
-        sum.cpu_s += process_cpu_s() - all;
+        sum.elapsed_s += sim::seconds_since(start);
+        sum.cpu_s += sim::process_processor_s() - all;
     }
 
     sim::World world;

@@ -12,8 +12,8 @@ struct ThreadsSpeed {
     double cpu_s = 0;      ///< of all threads
 };
 
-/// The same world with each number of threads (World::use_threads), in turns of 25 steps, so that other load meets
-/// all alike.
+/// The same world with each number of threads (World::use_threads), in turns of 25 steps, so that other load
+/// meets all alike.
 [[nodiscard]] std::vector<ThreadsSpeed> measure_threads(const sim::WorldDefinition& world,
                                                         const std::vector<int>& threads, int steps,
                                                         int rounds);

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <shared_run.h>
-#include <struck_speed.h>
 
 #include <algorithm>
 #include <map>
@@ -50,15 +49,6 @@ TEST(SharedRun, TradesAreCountedInTheBusiestWindow) {
     EXPECT_EQ(most_trades(run, 100, 300, 20), 0);
 }
 
-TEST(Strokes, WorkersAreStruckAsOften) {
-    const sim::WorkerLaunch launch = {MUSICWORLD_PROGRAM, {"worker"}};
-    const std::vector<sim_bench::StruckSpeed> all = sim_bench::measure_struck(7, {0, 2}, launch, 40);
-    ASSERT_EQ(all.size(), 2u);
-    EXPECT_EQ(all[1].workers, 2);
-    EXPECT_EQ(all[0].contacts, all[1].contacts);
-    EXPECT_GT(all[0].contacts, 40u);  // two sticks; some land where the other one is in the drum
-}
-
 std::map<std::string, double> figures_by_name(const WorkersBench& bench) {
     std::map<std::string, double> figures;
     for (const BenchResult& result : bench.report.results) figures[result.name] = result.value;
@@ -97,7 +87,7 @@ TEST(BenchWorkers, OnThisMachineRunsOfProcessesHaveAWallClockAndACriticalPath) {
     options.steps = 10;
     options.rounds = 2;
     options.program = MUSICWORLD_PROGRAM;
-    options.only = {"threads", "processes", "kit"};
+    options.only = {"threads", "processes"};
     std::map<std::string, double> figures =
         figures_by_name(bench_workers(options, [](const std::string&) {}));
     for (const std::string name : {"processes_bodies9_alone", "processes_bodies9_workers1_async",
@@ -106,8 +96,6 @@ TEST(BenchWorkers, OnThisMachineRunsOfProcessesHaveAWallClockAndACriticalPath) {
             EXPECT_GT(figures[name + what], 0) << name << what;
     EXPECT_EQ(figures.at("threads_bodies9_threads1_speed_up"), 1);
     EXPECT_EQ(figures.at("processes_bodies9_alone_critical_path_speed_up"), 1);
-    EXPECT_EQ(figures.at("kit_bodies10_workers0_speed_up"), 1);
-    EXPECT_GT(figures.at("kit_bodies100_workers1_critical_path"), 0);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #pragma once
 #include <sim/distributed_world.h>
+#include <simulated_processors.h>
 
 #include <map>
 #include <numeric>
@@ -69,8 +70,8 @@ inline sim::DistributedSettings for_steps(std::uint64_t steps) {
 }
 
 /// Workers in this process, by a clock that is modelled.
-inline sim::SimulatedProcessors processors(int count) {
-    sim::SimulatedProcessors how;
+inline sim_bench::SimulatedProcessors processors(int count) {
+    sim_bench::SimulatedProcessors how;
     how.count = count;
     how.modelled = true;
     return how;

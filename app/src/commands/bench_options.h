@@ -1,6 +1,6 @@
 #pragma once
-#include <sim/distributed_world.h>
 #include <sim/world.h>
+#include <simulated_processors.h>
 
 #include <optional>
 #include <set>
@@ -14,8 +14,8 @@ class Command;
 /// What `bench` measures, the parts of `bench workers` and the scenes of `bench hard`.
 inline const std::vector<std::string> kBenchNames = {"tracking", "sim",   "hard",    "workers",
                                                      "render",   "audio", "tradeoff"},
-                                      kWorkersBenchParts = {"speedup", "stragglers", "bound", "migration",
-                                                            "threads", "processes",  "kit",   "throughput"},
+                                      kWorkersBenchParts = {"speedup",   "stragglers", "bound",
+                                                            "migration", "threads",    "processes"},
                                       kHardSceneNames = {
                                           "table",        "ghost",   "card_through_wall", "boxes_1cm",
                                           "stack10_10cm", "stack15", "ratio1000",         "modal_ball_rolls",
@@ -38,11 +38,11 @@ struct WorkersBenchOptions {
     std::vector<int> bodies = {};  ///< none: 25 and 400; threads, processes: 400 and 1600
     std::vector<int> workers = {1, 2, 3, 5, 10};
     int steps = 500;
-    int bound = 4;                        ///< of speed-ups
-    int rounds = 3;                       ///< of threads and processes
-    sim::SimulatedProcessors processors;  ///< the clock
-    std::set<std::string> only;           ///< of kWorkersBenchParts; empty: all
-    std::string program;                  ///< musicworld, for worker processes
+    int bound = 4;                              ///< of speed-ups
+    int rounds = 3;                             ///< of threads and processes
+    sim_bench::SimulatedProcessors processors;  ///< the clock
+    std::set<std::string> only;                 ///< of kWorkersBenchParts; empty: all
+    std::string program;                        ///< musicworld, for worker processes
 };
 
 struct HardBenchOptions {

@@ -44,10 +44,10 @@ std::optional<WorkerOptions> worker_options_of(const TypedWorkers& typed) {
     return o;
 }
 
-std::optional<sim::SimulatedProcessors> read_processors(const std::string& text) {
+std::optional<sim_bench::SimulatedProcessors> read_processors(const std::string& text) {
     const std::size_t colon = text.find(':');
     if (text.substr(0, colon) != "simulated") return std::nullopt;
-    sim::SimulatedProcessors processors;
+    sim_bench::SimulatedProcessors processors;
     if (colon == std::string::npos) return processors;
     for (const std::string& part : split(text.substr(colon + 1))) {
         const auto pair = as::named("NAME=VALUE").read(part);
@@ -68,7 +68,7 @@ std::optional<sim::SimulatedProcessors> read_processors(const std::string& text)
 
 }  // namespace
 
-ValueFormat<sim::SimulatedProcessors> as::processors() {
+ValueFormat<sim_bench::SimulatedProcessors> as::processors() {
     return {
         "PROCESSORS",
         "",

@@ -12,7 +12,7 @@ void add_worker_options(Command& command, std::optional<WorkerOptions>& options)
 namespace as {
 
 /// "simulated[:latency=SECONDS,slowdown=TIMES,cost=measured|modelled]"; their count is left out.
-[[nodiscard]] ValueFormat<sim::SimulatedProcessors> processors();
+[[nodiscard]] ValueFormat<sim_bench::SimulatedProcessors> processors();
 
 }  // namespace as
 }  // namespace app

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tracking/input.h>
 
+#include <array>
 #include <bit>
 #include <cstring>
 #include <nlohmann/json.hpp>
@@ -23,7 +24,7 @@ using nlohmann::json;
 //   12      4      length of what comes next
 //   16      8      length of what comes then
 //   24      ...    JSON: all but the state; words and names of files as lists of bytes, doubles as their 64 bits
-//   ...     ...    the state of the world (sim/src/shared/run_state.cpp)
+//   ...     ...    the state of the world (sim/src/run/run_state.cpp)
 //   end-8   8      FNV-1a 64 of everything before
 
 constexpr std::string_view kMagic = "MWCHECK\n";
@@ -120,7 +121,19 @@ void read(const json& saved, Checkpoint& c) {
 }  // namespace
 
 std::string program_build() {
-    return fmt::format("{:016x}", sim::step_fingerprint());
+    sim::WorldDefinition definition;
+    definition.planes.push_back({});
+    for (int i = 0; i < 2; ++i) {  // soft bodies that fall onto the floor and each other
+        sim::WorldBody& body = definition.bodies.emplace_back();
+        body.shape.base = {{0.5, 0.4 + 0.1 * i, 0.6}, 0.8, 1.2};
+        body.material = {1e5, 0.3, 100};
+        body.fidelity.fidelity = sim::Fidelity::modal;
+        body.world_from_body.translation() = Eigen::Vector3d(0.1 * i, 0.5 + i, 0);
+        body.angular_velocity = {1, 2, 3};
+    }
+    sim::World world(definition);
+    for (int i = 0; i < 30; ++i) world.step();
+    return fingerprint(std::bit_cast<std::array<std::uint8_t, 8>>(world.state_hash()));
 }
 
 fs::path checkpoint_file(const fs::path& out) {

@@ -88,7 +88,7 @@ sim::DistributedResult run(const Scene& scene, const SimulateOptions& options,
         return sim::run_alone(scene, settings, observer, from,
                               options.threads.value_or(int(worthwhile_threads())));
     if (options.workers->simulated)
-        return sim::simulate_processors(scene, settings, *options.workers->simulated, observer);
+        return sim_bench::simulate_processors(scene, settings, *options.workers->simulated, observer);
     return sim::run_distributed(scene, settings, launch_of(*options.workers, options.threads.value_or(1)),
                                 observer);
 }

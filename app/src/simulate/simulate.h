@@ -1,5 +1,6 @@
 #pragma once
 #include <sim/distributed_world.h>
+#include <simulated_processors.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -20,8 +21,8 @@ struct WorkerOptions {
     bool balance = true;
     std::string listen;  ///< endpoint; empty: in a private folder
     std::filesystem::path keys;
-    int expect = 0;                                     ///< workers before the first step
-    std::optional<sim::SimulatedProcessors> simulated;  ///< instead of processes
+    int expect = 0;                                           ///< workers before the first step
+    std::optional<sim_bench::SimulatedProcessors> simulated;  ///< instead of processes
 };
 
 struct SimulateOptions {

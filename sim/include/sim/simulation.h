@@ -113,10 +113,6 @@ struct WorkerLaunch {
 [[nodiscard]] std::unique_ptr<Simulation> make_distributed_simulation(std::vector<BodyDefinition> bodies,
                                                                       const WorkerLaunch& launch);
 
-/// The worker process: joins at `endpoint` and serves until its application ends the run or is gone.
-/// Returns an exit status.
-[[nodiscard]] int run_worker(const std::string& endpoint);
-
 /// Rest-shape queries for scoring and layout: signed distance of a world point to the body's rest surface
 /// grown by `radius_m`.
 [[nodiscard]] SurfacePoint rest_distance(const BodyDefinition& body, const Eigen::Vector3d& point_world,

@@ -5,148 +5,169 @@
 #include <set>
 #include <vector>
 
-#include "shared/body_costs.h"
+#include "run/scene_clock.h"
+#include "shared/border_selection.h"
 #include "shared/columns.h"
-#include "shared/neighbour_telling.h"
-#include "shared/scene_clock.h"
 #include "shared/shared_contacts.h"
 #include "shared/structures.h"
 #include "world/shared_world.h"
 
 namespace sim {
 
-/// How one worker keeps its copy of the world consistent with the others'. Uses no clock, no sockets and no load
-/// balancing. A body is own, foreign, or given (handed over, but not yet registered elsewhere: no worker steps it).
+/// Keeps one worker's copy of the world consistent with the others'. It uses no clock, no sockets and no load
+/// balancing.
 ///
-/// Every worker is at a step of its own. Its world holds its bodies; of the others' bodies those that may come
-/// near are put in as ghosts for each step, and move with them.
+/// Every worker is at a step of its own. Its world steps its own bodies. Those of the others' bodies that may
+/// come near are placed as ghosts for each step, and move with them.
 ///
-/// After a step it tells every other worker which of its bodies may come near that one's, as far as it knows where these are, and
-/// what it found at contacts with them; the application is told of all bodies. A body that is not named is far away. What sleeps is
-/// told once to each, when it is near, and once more when it wakes.
+/// After a step the worker sends border data to every other worker: the states of own bodies that may come
+/// near that worker's bodies, and the impulses at contacts between the two (NeighbourMessage). The
+/// application gets the states of all own bodies. A body whose state is not sent is far away. The state of a
+/// sleeping body is sent once, and again when it wakes.
 ///
-/// Bodies change owners at a step which all other owners have told the seller, see may_give: so it has compared with them what was found
-/// up to there, and the buyer compares what comes after. Who does not know yet of a sale tells the seller what it finds at these bodies;
-/// as soon as it knows it tells the buyer (FoundMessage). Until all have done so the buyer
-/// compares nothing of them. As the application passes on all that is said in one order, what a worker says that knows of a sale
-/// comes when this one knows of it, too, and has heard the seller up to it.
+/// A body changes owners at a step up to which the seller has received what all others found at it
+/// (may_hand_over). So the seller has compared everything up to this step, and the buyer compares what comes
+/// after. A worker that does not know of a sale yet sends to the seller what it finds at these bodies; as
+/// soon as it knows, it sends that to the buyer, too (FoundMessage). Until all workers have done so, the
+/// buyer compares nothing at these bodies. The application relays all messages in one order. So when a worker
+/// receives a message whose sender knows of a sale, it knows of the sale, too, and has the seller's messages
+/// up to it.
 ///
-/// A contact between bodies of two owners is resolved by both (SharedContacts), and workers whose bodies touch keep closer to
-/// each other (touching_lead).
+/// A contact between bodies of two owners is resolved by both (SharedContacts). Workers whose bodies touch
+/// stay closer together than the bound demands (touching_lead).
 class BoundedExchange {
 public:
     explicit BoundedExchange(const SceneMessage& scene);
 
-    /// How encoded messages leave, to the application; to be set before anything else.
+    /// Sends an encoded message to the application. To be set before anything else.
     using Send = std::function<void(std::vector<std::uint8_t>&&)>;
     void send_by(Send send) { send_ = std::move(send); }
-    /// What another worker reports of a step: its header, the seconds of a step, the number of its bodies.
+    /// Takes what another worker reports of a step: its header, the seconds of a step, the number of its
+    /// bodies.
     using Report = std::function<void(const MessageHeader&, double smoothed_s, std::uint32_t own)>;
     void report_to(Report report) { report_ = std::move(report); }
 
-    /// What another worker says, once the application has checked it (NeighbourCheck).
-    void take(const MessageHeader& header, NeighbourMessage&& message);
-    void take(const MessageHeader& header, FoundMessage&& message);
-    /// Once, before the first step of one who joins late.
-    void take(const MessageHeader& header, const PastMessage& message);
-    /// The members now, and the epoch in which the application says so. Workers that left own nothing from here on;
-    /// Ownership messages say who owns their bodies.
-    void members(const Members& message, std::uint32_t epoch);
-    /// Registered owners, in this epoch. Becomes effective at the message's step: this worker may have to take over
-    /// bodies that are some steps away.
-    void own(const Ownership& ownership, std::uint32_t epoch);
-    /// Bodies came to this worker after its last step, which nobody has published of them. Who came to the last step by
-    /// taking bodies over has to say so, and where it is who goes on to a step in which bodies come.
-    [[nodiscard]] bool owes() const {
+    /// Messages of other workers. The application has checked them (NeighbourCheck).
+    void receive(const MessageHeader& header, NeighbourMessage&& message);
+    void receive(const MessageHeader& header, FoundMessage&& message);
+    /// For a worker that joins late: once, before its first step.
+    void receive(const MessageHeader& header, const PastMessage& message);
+    /// The members from this epoch on. Workers that left own nothing any more; Ownership messages name new
+    /// owners.
+    void set_members(const Members& message, std::uint32_t epoch);
+    /// A registered owner, from this epoch on. It takes effect at the message's step, which may be some steps
+    /// ahead.
+    void set_owner(const Ownership& ownership, std::uint32_t epoch);
+    /// Whether the present step has to be published although no step() led to it: this worker came to the
+    /// last step by taking over bodies, or owns bodies only from a later step on and advanced to it.
+    [[nodiscard]] bool must_publish() const {
         return published_ < step_ && (owned_.empty() ? owners_.contains(self_) : at_end());
     }
 
-    /// Whether the next step can be done now: its inputs have arrived and the bound allows it. False if
-    /// done(), or if no body is own.
+    /// Whether the next step can be done now: this worker owns bodies, its inputs have come and the bound
+    /// allows it.
     [[nodiscard]] bool ready() const;
     void step();  ///< requires ready()
-    /// Sends the messages of the step just done. Called once after step(), and where it owes().
+    /// Sends the messages of the step just done: once after step(), and where must_publish().
     void publish(std::uint32_t epoch, const StepReport& report);
     /// Without own bodies: advances as far as the others' messages allow.
-    void follow();
+    void advance_without_bodies();
 
-    [[nodiscard]] Holdings holdings();  ///< who has what where, for load balancing
-    /// Whether what is own may be given: all is known that others found at it up to this step.
-    [[nodiscard]] bool may_give() const;
-    /// That another worker has done, as far as is known.
-    [[nodiscard]] std::uint64_t steps_of(std::uint32_t worker) const { return known(worker); }
-    /// Stops owning: their exact records at the end of this worker's last step. The caller sends the
-    /// Handover.
-    [[nodiscard]] Handover give(const std::vector<std::uint32_t>& bodies);
-    /// After a step: notes what each own body costs, for load balancing.
-    void weigh() { costs_.add(world_, owned_); }
+    [[nodiscard]] Holdings holdings();  ///< who owns how much where, for load balancing
+    /// Whether own bodies may be handed over: all that others found at them up to this step is known and
+    /// compared.
+    [[nodiscard]] bool may_hand_over() const;
+    /// Steps that a worker has done, as far as is known.
+    [[nodiscard]] std::uint64_t steps_of(std::uint32_t worker) const { return peer(worker).steps; }
+    /// Gives up own bodies. Their records are exact, at the end of this worker's last step. The caller sends
+    /// the Handover.
+    [[nodiscard]] Handover hand_over(const std::vector<std::uint32_t>& bodies);
+    void update_costs() { costs_.add(world_, owned_); }  ///< after a step: of own bodies, for load balancing
 
     [[nodiscard]] std::uint64_t steps_done() const { return step_; }  ///< by this worker
     [[nodiscard]] bool at_end() const { return step_ >= settings_.steps; }
-    /// Nothing is left to do. One more publication follows the last step, once all others have done theirs:
-    /// corrected by the impulses that arrived late.
+    /// Nothing is left to do. Once all others have done the last step, it is published again: corrected by
+    /// the impulses that came late.
     [[nodiscard]] bool done() const { return at_end() && settled_; }
     [[nodiscard]] int own_bodies() const { return static_cast<int>(owned_.size()); }
-    /// No body is own, or will be in some steps.
-    [[nodiscard]] bool has_nothing() const { return owned_.empty() && later_.empty() && !owners_follow_; }
+    /// This worker owns no body, now or from a later step on.
+    [[nodiscard]] bool has_nothing() const { return owned_.empty() && future_.empty() && !owners_follow_; }
     [[nodiscard]] int lead() const;                             ///< steps ahead of the slowest owner, now
     [[nodiscard]] int ghost_age() const { return ghost_age_; }  ///< of the oldest used in the last step
     [[nodiscard]] const SharedWorld& world() const { return world_; }
     void use_threads(int threads) { world_.use_threads(threads); }  ///< see World::use_threads
 
 private:
-    struct Felt {                   // what other bodies of this worker do to an own one
-        StepImpulse mean;           // of a step
-        int steps = 0;              // that it is of
-        std::uint64_t held = 0;     // step in which they last did anything
-        std::uint64_t touched = 0;  // step in which it last touched another worker's
-        bool watched = false;       // in the step
+    /// How this worker's other bodies hold an own body that touches others' bodies.
+    struct ContactHistory {
+        StepImpulse mean;                 // of a step
+        int steps = 0;                    // over which it is the mean
+        std::uint64_t held = 0;           // last step with an impulse
+        std::uint64_t cross_contact = 0;  // last step in which the body touched another worker's body
+        bool watched = false;             // in the present step
     };
-    void come_to(std::uint64_t step);
-    void list();
-    void set_own(int body, bool own);
-    struct Later {
+    /// What is known of another worker.
+    struct Peer {
+        std::uint64_t steps = 0;          // that it has done
+        std::uint64_t message_step = 0;   // of its last message
+        std::uint32_t message_epoch = 0;  // likewise
+        std::uint64_t begun = 0;          // step at which it got bodies after it had owned nothing
+    };
+    /// Bodies that are registered for this worker from a later step on.
+    struct FutureOwnership {
         Ownership ownership;
         std::uint32_t epoch;
     };
-    void take_over(const Later& later);
-    void take_due();
+    /// Bodies that were bought. Not all others have sent yet what they found at them.
+    struct Purchase {
+        std::uint32_t epoch;
+        std::set<std::uint32_t> waiting_for;  // workers
+        std::vector<int> bodies = {};
+        std::optional<std::uint64_t> step = {};  // from which they are own; none: they are still to come
+        [[nodiscard]] bool is_complete() const { return step && waiting_for.empty(); }
+    };
+    struct Touch {
+        std::uint64_t step = 0;  // in which bodies of the worker and own ones last touched
+        int pairs = 0;           // of bodies, then
+    };
+    /// An own body after a step, in the order of BorderSelection.
+    struct OwnBody {
+        int body;
+        std::int32_t update = -1,
+                     packed = -1;  // places in the application's message and in packed_; -1: none
+    };
+
+    void apply_events(std::uint64_t step);
+    void list_bodies();
+    void set_own(int body, bool own);
+    void take_over(const FutureOwnership& due);
+    void take_over_due();
     void place_ghosts();
-    void keep_crossed();
-    void feel();
+    void record_cross_impulses();
+    void update_contact_histories();
     void publish_last(const StepReport& report) const;
-    void tell_neighbours(const StepReport& report);
-    void tell(std::uint32_t worker);
-    void tell(int body, Update& update);
-    void see(int body, const WorldBodyState& state, bool asleep);
-    void pack(std::size_t which);
-    [[nodiscard]] bool is_told(int body) const;
-    void take_around(const Ownership& ownership);
-    void bought(std::vector<int>&& bodies, std::uint32_t epoch);
-    void complete();
+    void collect_own();
+    void send_borders(const StepReport& report);
+    void send_border(std::uint32_t worker);
+    void fill_update(int body, Update& update);
+    void pack(OwnBody& own);
+    [[nodiscard]] bool is_current(int body) const;
+    void set_surroundings(const Ownership& ownership);
+    void begin_purchase(std::vector<int>&& bodies, std::uint32_t epoch);
+    void finish_purchases();
     void compare(std::uint32_t worker, std::uint64_t step) {
         if (step <= step_) contacts_.compare(worker, step, step_);
     }
-    void see_own();
-    [[nodiscard]] std::vector<WorldRecord> coming() const;
+    [[nodiscard]] std::vector<WorldRecord> future_bodies() const;
     void send(const WorkerMessage& message) const { send_(encode({self_, epoch_, step_}, message)); }
-    [[nodiscard]] std::uint64_t known(std::uint32_t worker) const {
-        const auto found = known_.find(worker);
-        return found == known_.end() ? 0 : found->second;
+    [[nodiscard]] Peer peer(std::uint32_t worker) const {
+        const auto found = peers_.find(worker);
+        return found == peers_.end() ? Peer{} : found->second;
     }
-    [[nodiscard]] std::uint64_t told(std::uint32_t worker) const {
-        const auto found = told_.find(worker);
-        return found == told_.end() ? 0 : found->second;
-    }
-    [[nodiscard]] std::uint32_t epoch_of(std::uint32_t worker) const {
-        const auto found = knows_.find(worker);
-        return found == knows_.end() ? 0 : found->second;
-    }
-    [[nodiscard]] std::uint64_t slowest() const;
-    [[nodiscard]] bool all_is_told(std::uint64_t step) const;
-    [[nodiscard]] bool begins_at(std::uint32_t worker, std::uint64_t step) const;
-    [[nodiscard]] bool is_waited_for() const;
-    [[nodiscard]] bool owns_any(std::uint32_t worker) const;
+    [[nodiscard]] std::uint64_t least_steps() const;
+    [[nodiscard]] bool all_reported(std::uint64_t step) const;
+    [[nodiscard]] bool comparison_is_overdue() const;
+    [[nodiscard]] bool owns_bodies(std::uint32_t worker) const;
 
     Send send_;
     Report report_;
@@ -156,60 +177,41 @@ private:
     SceneClock clock_;
     BodyCosts costs_;
     ColumnWatch columns_;
-    PlannedStructures planned_;
+    StructureFinder structures_;
     ForeignBodies foreign_;
-    std::uint64_t published_ = 0;  // step
-    std::uint64_t step_ = 0;
-    std::vector<std::uint32_t> owner_;  // as registered
-    std::set<std::uint32_t> owners_;    // who has any
-    std::vector<std::uint32_t> since_;  // bodies: epoch of that, or in which the application told of them
-    std::vector<std::uint8_t> own_, awaits_;  // awaits_: own, and what others found at it is not known
-    std::vector<int> owned_, others_;         // there, ascending; moving ones of others
+    std::uint64_t step_ = 0, published_ = 0;
+    std::vector<std::uint32_t> owner_;  // of each body, as registered
+    std::set<std::uint32_t> owners_;    // workers that own any
+    std::vector<std::uint32_t>
+        since_;  // of each body: epoch of its owner, or of what the application sent of it
+    std::vector<std::uint8_t> own_;      // of each body
+    std::vector<std::uint8_t> waiting_;  // of each body: see SharedContacts::Owners
+    std::vector<int> owned_, others_;    // bodies that exist and move, ascending
     std::vector<std::uint32_t> members_;
     bool owners_follow_ = true;  // not all owners are known
     SharedContacts contacts_;
-    std::map<std::uint32_t, std::uint64_t> known_;  // workers: step that they have done
-    std::map<std::uint32_t, std::uint64_t> told_;   // workers: step of their last message
-    std::map<std::uint32_t, std::uint32_t> knows_;  // workers: epoch of their last message
-    std::map<std::uint32_t, std::uint64_t>
-        begun_;          // workers that owned nothing before: step in which they got bodies
-    bool late_ = false;  // others were under way before this one came
-    std::vector<Later> later_;
-    std::vector<ForeignBall> balls_;
-    std::vector<int> near_;
-    std::vector<CrossImpulse> crossed_;              // in the last step
-    WorldRecord record_;                             // of the body that is being told of
+    std::map<std::uint32_t, Peer> peers_;
+    std::map<std::uint32_t, Touch> touched_;  // by worker
+    bool late_ = false;                       // others had begun before this worker joined
+    std::vector<FutureOwnership> future_;
+    std::vector<Purchase> purchases_;
     std::vector<std::uint32_t> breakable_, broken_;  // constraints; those that broke in the last step
     std::vector<int> first_of_constraint_;           // the first body of each that moves
-    std::map<int, Felt> felt_;                       // of own bodies that touch others'
-    std::vector<std::uint8_t> told_asleep_;          // the application was
-    // Kept for their storage:
-    WorkerMessage outgoing_ = UpdateMessage{}, to_neighbour_ = NeighbourMessage{};
+    std::map<int, ContactHistory> contact_history_;  // of own bodies that touch others'
+    std::vector<std::uint8_t> sent_asleep_;          // of each body: the application knows that it sleeps
+    std::vector<std::uint8_t> flat_;                 // of each body that exists: is_flat
+    BorderSelection border_;
+    // Of the last step; kept for their storage:
+    std::vector<ForeignBall> balls_;
+    std::vector<int> near_;
+    std::vector<CrossImpulse> crossed_;
+    WorldRecord record_;
+    WorkerMessage to_application_ = UpdateMessage{}, to_neighbour_ = NeighbourMessage{};
     Update update_;
-    NeighbourTelling telling_;
-    struct Packed {  // of each own body, as seen by telling_
-        int body;
-        std::int32_t update = -1, at = -1;  // in the message to the application, in packed_; -1: not there
-    };
-    std::vector<Packed> seen_;
-    PackedUpdates packed_;            // as neighbours need them
-    std::vector<std::uint8_t> flat_;  // bodies that are there: is_flat
-    /// Own bodies at which others have found what they have not yet told.
-    struct Purchase {
-        std::uint32_t epoch;
-        std::set<std::uint32_t> silent;  // workers
-        std::vector<int> bodies = {};
-        std::optional<std::uint64_t> step = {};  // up to which it is compared; none: they are not there yet
-        [[nodiscard]] bool is_complete() const { return step && silent.empty(); }
-    };
-    std::vector<Purchase> purchases_;
-    struct Touch {
-        std::uint64_t step = 0;  // in which their bodies and own ones last touched
-        int pairs = 0;           // of bodies, then
-    };
-    std::map<std::uint32_t, Touch> touched_;  // workers
+    std::vector<OwnBody> own_bodies_;
+    PackedUpdates packed_;
     int ghost_age_ = 0;
-    bool settled_ = false;
+    bool settled_ = false;  // the last step was published with all corrections
 };
 
 }  // namespace sim

@@ -13,7 +13,7 @@ namespace sim {
 namespace {
 
 constexpr double kSoft = 0.25;  // of a side
-constexpr double kLiesSeconds = 2;
+constexpr double kSettledSeconds = 2;
 
 struct Step {
     int x, y, weight;
@@ -28,12 +28,19 @@ constexpr std::array<Step, 9> kAround = {{{0, 0, 4},
                                           {1, -1, 1},
                                           {1, 1, 1}}};
 
-// What is not a number, of a body that is to be taken out, is somewhere, too.
+// A broken body has a column, too, until it is taken out.
 int whole(double sides) {
     return static_cast<int>(std::floor(sides >= -1e9 ? std::min(sides, 1e9) : -1e9));
 }
 
 }  // namespace
+
+void BodyCosts::add(const SharedWorld& world, std::span<const int> bodies) {
+    for (const int body : bodies) {
+        double& cost = cost_[static_cast<std::size_t>(body)];
+        cost = cost < 0 ? world.work(body) : cost + (world.work(body) - cost) / kSmoothing;
+    }
+}
 
 Columns::Columns(const WorldScene& scene) {
     double sum = 0;
@@ -48,7 +55,7 @@ Columns::Columns(const WorldScene& scene) {
     y_ = up_.cross(x_);
 }
 
-// In sides.
+// The position in the two directions across gravity, in sides.
 Eigen::Vector2d Columns::across(const Eigen::Vector3d& place) const {
     return Eigen::Vector2d(x_.dot(place), y_.dot(place)) / side_;
 }
@@ -65,24 +72,25 @@ Column Columns::of(const Eigen::Vector3d& place, const Column& before) const {
 
 void Columns::assign(std::span<const std::optional<Eigen::Vector3d>> places,
                      std::vector<std::optional<Column>>& columns) const {
-    std::vector<std::size_t> there, standing;
+    std::vector<std::size_t> fresh, assigned;
     for (std::size_t i = 0; i < places.size(); ++i)
-        if (places[i]) (columns[i] ? standing : there).push_back(i);
-    for (const std::size_t i : standing) columns[i] = of(*places[i], *columns[i]);
-    if (there.empty()) return;
+        if (places[i]) (columns[i] ? assigned : fresh).push_back(i);
+    for (const std::size_t i : assigned) columns[i] = of(*places[i], *columns[i]);
+    if (fresh.empty()) return;
     const auto height = [&](std::size_t i) {
         const double h = up_.dot(*places[i]);
         return std::pair(std::isfinite(h) ? h : -1e300, i);
     };
-    std::ranges::sort(there, {}, height);
-    // What stands, by the column over which its middle is: whatever is near enough is there or in one of the eight around.
+    std::ranges::sort(fresh, {}, height);
+    // Assigned places by the column that contains them: near places are in the same or one of the eight
+    // around it.
     std::unordered_map<Column, std::vector<std::size_t>, Column::Hash> over;
-    const auto stands = [&](std::size_t i) {
+    const auto insert = [&](std::size_t i) {
         const Eigen::Vector2d at = across(*places[i]);
         over[{whole(at.x()), whole(at.y())}].push_back(i);
     };
-    for (const std::size_t i : standing) stands(i);
-    for (const std::size_t i : there) {
+    for (const std::size_t i : assigned) insert(i);
+    for (const std::size_t i : fresh) {
         const Eigen::Vector2d at = across(*places[i]);
         const Column here{whole(at.x()), whole(at.y())};
         std::optional<std::size_t> under;
@@ -95,26 +103,26 @@ void Columns::assign(std::span<const std::optional<Eigen::Vector3d>> places,
                     under = j;
         }
         columns[i] = under ? *columns[*under] : here;
-        stands(i);
+        insert(i);
     }
 }
 
 int Holdings::count(const Column& column, std::uint32_t worker) const {
-    const auto owners = there_.find(column);
-    if (owners == there_.end()) return 0;
+    const auto owners = counts_.find(column);
+    if (owners == counts_.end()) return 0;
     const auto found = std::ranges::find(owners->second, worker, &std::pair<std::uint32_t, int>::first);
     return found == owners->second.end() ? 0 : found->second;
 }
 
 void Holdings::add(const Column& column, std::uint32_t owner, int bodies) {
-    auto& owners = there_[column];
+    auto& owners = counts_[column];
     const auto found = std::ranges::find(owners, owner, &std::pair<std::uint32_t, int>::first);
     if (found == owners.end())
         owners.emplace_back(owner, bodies);
     else
         found->second += bodies;
-    Middle& middle = middles_[owner];
-    middle.x += bodies * column.x, middle.y += bodies * column.y, middle.bodies += bodies;
+    Sum& sum = sums_[owner];
+    sum.x += bodies * column.x, sum.y += bodies * column.y, sum.bodies += bodies;
 }
 
 void Holdings::add(Lot&& own) {
@@ -122,10 +130,10 @@ void Holdings::add(Lot&& own) {
     if (same == lots_.end()) return lots_.push_back(std::move(own));
     same->bodies.insert(same->bodies.end(), own.bodies.begin(), own.bodies.end());
     same->cost = same->cost < 0 || own.cost < 0 ? -1 : same->cost + own.cost;
-    same->lies = same->lies && own.lies;
+    same->settled = same->settled && own.settled;
 }
 
-int Holdings::shortens(const Lot& lot, std::uint32_t other) const {
+int Holdings::border_saved(const Lot& lot, std::uint32_t other) const {
     const int bodies = static_cast<int>(lot.bodies.size());
     int sum = 0;
     for (const Step& step : kAround) {
@@ -138,11 +146,10 @@ int Holdings::shortens(const Lot& lot, std::uint32_t other) const {
 }
 
 double Holdings::distance2(const Column& column, std::uint32_t worker) const {
-    const auto found = middles_.find(worker);
-    if (found == middles_.end() || found->second.bodies <= 0) return 0;
-    const Middle& middle = found->second;
-    return std::pow(column.x - middle.x / middle.bodies, 2) +
-           std::pow(column.y - middle.y / middle.bodies, 2);
+    const auto found = sums_.find(worker);
+    if (found == sums_.end() || found->second.bodies <= 0) return 0;
+    const Sum& sum = found->second;
+    return std::pow(column.x - sum.x / sum.bodies, 2) + std::pow(column.y - sum.y / sum.bodies, 2);
 }
 
 void Holdings::move(const Lot& lot, std::uint32_t to) {
@@ -152,10 +159,10 @@ void Holdings::move(const Lot& lot, std::uint32_t to) {
 
 std::map<std::uint32_t, std::set<std::uint32_t>> Holdings::neighbours() const {
     std::map<std::uint32_t, std::set<std::uint32_t>> result;
-    for (const auto& [column, owners] : there_)
+    for (const auto& [column, owners] : counts_)
         for (const Step& step : kAround) {
-            const auto near = there_.find({column.x + step.x, column.y + step.y});
-            if (near == there_.end()) continue;
+            const auto near = counts_.find({column.x + step.x, column.y + step.y});
+            if (near == counts_.end()) continue;
             for (const auto& [a, bodies] : owners)
                 for (const auto& [b, others] : near->second)
                     if (a != b && bodies > 0 && others > 0) result[a].insert(b);
@@ -164,45 +171,45 @@ std::map<std::uint32_t, std::set<std::uint32_t>> Holdings::neighbours() const {
 }
 
 ColumnWatch::ColumnWatch(const WorldScene& scene)
-    : columns_(scene), lots_(joined_lots(scene)), column_(lots_.size()) {}
+    : columns_(scene), groups_(tied_groups(scene)), column_(groups_.size()) {}
 
 Holdings ColumnWatch::holdings(std::uint32_t self, const SharedWorld& world,
                                std::span<const std::uint32_t> owner, const BodyCosts& costs,
                                const std::function<Eigen::Vector3d(int)>& place,
                                const std::vector<std::vector<int>>& structures) {
-    const auto there = [&](int body) {
+    const auto has_owner = [&](int body) {
         return body < world.bodies() && owner[static_cast<std::size_t>(body)] != kApplication;
     };
     struct Middle {
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
         int bodies = 0;
     };
-    const std::vector<int> first = joined_by(structures, lots_);
-    std::vector<Middle> middles(lots_.size());
-    for (std::size_t i = 0; i < lots_.size(); ++i)
-        for (const int body : lots_[i]) {
-            if (!there(body)) continue;
+    const std::vector<int> first = joined_by(structures, groups_);
+    std::vector<Middle> middles(groups_.size());
+    for (std::size_t i = 0; i < groups_.size(); ++i)
+        for (const int body : groups_[i]) {
+            if (!has_owner(body)) continue;
             Middle& middle = middles[static_cast<std::size_t>(first[i])];
             middle.sum += place(body), ++middle.bodies;
         }
-    std::vector<std::optional<Eigen::Vector3d>> places(lots_.size());
-    for (std::size_t i = 0; i < lots_.size(); ++i)
+    std::vector<std::optional<Eigen::Vector3d>> places(groups_.size());
+    for (std::size_t i = 0; i < groups_.size(); ++i)
         if (middles[i].bodies > 0) places[i] = middles[i].sum / middles[i].bodies;
     columns_.assign(places, column_);
     Holdings holdings(self);
-    const double leaves = columns_.side() / kLiesSeconds;
-    for (std::size_t i = 0; i < lots_.size(); ++i) {
+    const double fast = columns_.side() / kSettledSeconds;
+    for (std::size_t i = 0; i < groups_.size(); ++i) {
         if (!places[static_cast<std::size_t>(first[i])]) continue;
         column_[i] = column_[static_cast<std::size_t>(first[i])];
         Holdings::Lot own{*column_[i], {}, 0, true};
-        for (const int body : lots_[i]) {
-            if (!there(body)) continue;
+        for (const int body : groups_[i]) {
+            if (!has_owner(body)) continue;
             holdings.add(own.column, owner[static_cast<std::size_t>(body)], 1);
             if (owner[static_cast<std::size_t>(body)] != self || !world.own(body)) continue;
             own.bodies.push_back(static_cast<std::uint32_t>(body));
             const double cost = costs.of(body);
             own.cost = own.cost < 0 || cost < 0 ? -1 : own.cost + cost;
-            own.lies = own.lies && world.state(body).velocity.norm() < leaves;
+            own.settled = own.settled && world.state(body).velocity.norm() < fast;
         }
         if (!own.bodies.empty()) holdings.add(std::move(own));
     }

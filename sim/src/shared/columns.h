@@ -10,13 +10,27 @@
 #include <utility>
 #include <vector>
 
-#include "shared/body_costs.h"
 #include "sim/distributed_world.h"
 #include "world/shared_world.h"
 
 namespace sim {
 
-/// A column of space along gravity, by whole sides across.
+/// Smoothed work of each body (World::work): its share of what a step takes.
+class BodyCosts {
+public:
+    static constexpr double kSmoothing = 5;  ///< time constant [steps]
+    explicit BodyCosts(int bodies) : cost_(static_cast<std::size_t>(bodies), -1.0) {}
+    /// Adds the work of the last step, of bodies that took part in it.
+    void add(const SharedWorld& world, std::span<const int> bodies);
+    void forget(int body) { cost_[static_cast<std::size_t>(body)] = -1; }  ///< its smoothing starts anew
+    /// Negative: unknown.
+    [[nodiscard]] double of(int body) const { return cost_[static_cast<std::size_t>(body)]; }
+
+private:
+    std::vector<double> cost_;
+};
+
+/// A column of space along gravity, by whole sides in the two directions across.
 struct Column {
     int x = 0, y = 0;
     auto operator<=>(const Column&) const = default;
@@ -29,16 +43,16 @@ struct Column {
     };
 };
 
-/// Cuts space into columns along gravity. Their side is the mean diameter of the scene's bodies that move [m],
-/// so that a single stack is one column. Borders are soft by a quarter of a side: what is within that of a
-/// border may belong to either.
+/// Cuts space into columns along gravity. Their side is the mean diameter of the scene's bodies that move
+/// [m], so that a single stack is one column. Borders are soft by a quarter of a side: a body that is nearer
+/// to a border than this may belong to either column.
 class Columns {
 public:
     explicit Columns(const WorldScene& scene);
     [[nodiscard]] double side() const noexcept { return side_; }
-    /// Of places that have none yet, the lowest first: what is above another within a quarter of a side across
-    /// joins that one's column, if it may belong there; so no stack on a border is cut. Those that have one
-    /// keep it until they are beyond the soft border.
+    /// Gives each place a column. A place that has one keeps it until it is beyond the soft border. The
+    /// others get theirs from the lowest up: a place that is above another one, within a quarter of a side
+    /// across, joins that one's column if it may belong there. So no stack on a border is cut.
     void assign(std::span<const std::optional<Eigen::Vector3d>> places,
                 std::vector<std::optional<Column>>& columns) const;
 
@@ -51,50 +65,52 @@ private:
     Eigen::Vector3d up_, x_, y_;
 };
 
-/// Who has how many bodies in which column, as one worker knows it, and that worker's own lots: what it has in
-/// one column, which is sold as a whole.
+/// How many bodies each worker owns in each column, as one worker knows it, and that worker's own lots. A lot
+/// is all that it owns in one column; it is sold as a whole.
 class Holdings {
 public:
     struct Lot {
         Column column;
         std::vector<std::uint32_t> bodies;
-        double cost = 0;   ///< smoothed, in any unit; negative: not all are known yet
-        bool lies = true;  ///< no body goes as far as a side within two seconds, as fast as it is
+        double cost = 0;      ///< smoothed, in any unit; negative: not all bodies' costs are known yet
+        bool settled = true;  ///< at its present speed no body moves by a side within two seconds
     };
     explicit Holdings(std::uint32_t self) : self_(self) {}
     void add(const Column& column, std::uint32_t owner, int bodies);
-    void add(Lot&& own);  ///< joins what is there of the column
+    void add(Lot&& own);  ///< joins the lot of its column, if there is one
     [[nodiscard]] std::vector<Lot>& lots() noexcept { return lots_; }
     [[nodiscard]] const std::vector<Lot>& lots() const noexcept { return lots_; }
-    /// By how much the border between the two becomes shorter if the lot is the other's: pairs of bodies side by
-    /// side, a column's corner counts half a side, what stands in one column double.
-    [[nodiscard]] int shortens(const Lot& lot, std::uint32_t other) const;
-    /// Square of the distance of a column from the middle of a worker's, in sides; 0: it has none.
+    /// By how much the border between the two workers becomes shorter if the other one gets the lot. Its
+    /// length is counted in pairs of bodies in touching columns: at a corner a pair counts 1, at a side 2,
+    /// within one column 4.
+    [[nodiscard]] int border_saved(const Lot& lot, std::uint32_t other) const;
+    /// Squared distance of a column from the mean of a worker's bodies, in sides; 0: it has none.
     [[nodiscard]] double distance2(const Column& column, std::uint32_t worker) const;
     void move(const Lot& lot, std::uint32_t to);
-    /// Of each worker those with whom it has columns in common, or that touch.
+    /// Neighbours of each worker: workers with bodies in the same or touching columns.
     [[nodiscard]] std::map<std::uint32_t, std::set<std::uint32_t>> neighbours() const;
 
 private:
     [[nodiscard]] int count(const Column& column, std::uint32_t worker) const;
-    struct Middle {
+    struct Sum {
         double x = 0, y = 0, bodies = 0;
     };
     std::uint32_t self_;
     std::unordered_map<Column, std::vector<std::pair<std::uint32_t, int>>, Column::Hash>
-        there_;  // owner, bodies
-    std::map<std::uint32_t, Middle> middles_;
+        counts_;                         // owner, bodies
+    std::map<std::uint32_t, Sum> sums_;  // by worker
     std::vector<Lot> lots_;
 };
 
-/// The columns of a run's bodies, followed. Bodies that constraints tie together are in the column of their
-/// middle, and so are those of a structure.
+/// Follows the columns of a run's bodies. Bodies that constraints tie together are in the column of their
+/// mean position; so are the bodies of a structure.
 class ColumnWatch {
 public:
     explicit ColumnWatch(const WorldScene& scene);
     /// Mean diameter of bodies [m].
     [[nodiscard]] double side() const noexcept { return columns_.side(); }
-    /// `owner`: of each body, kApplication for none; `place`: centre of a body of the world [m]; `structures`: see there.
+    /// `owner`: of each body, kApplication for none. `place`: centre of a body of the world [m].
+    /// `structures`: see structures.h.
     [[nodiscard]] Holdings holdings(std::uint32_t self, const SharedWorld& world,
                                     std::span<const std::uint32_t> owner, const BodyCosts& costs,
                                     const std::function<Eigen::Vector3d(int)>& place,
@@ -102,8 +118,8 @@ public:
 
 private:
     Columns columns_;
-    std::vector<std::vector<int>> lots_;         // tied together
-    std::vector<std::optional<Column>> column_;  // of each
+    std::vector<std::vector<int>> groups_;       // bodies that are tied together
+    std::vector<std::optional<Column>> column_;  // of each group
 };
 
 }  // namespace sim

@@ -9,11 +9,12 @@
 namespace sim {
 namespace {
 
-constexpr std::uint64_t kGatherEvery = 2;  // steps
+constexpr std::uint64_t kConsolidateEvery = 2;  // steps
 
 }  // namespace
 
-// A record of 128 modes has 2163 bytes, an impulse between two bodies 33, the number of a constraint that broke 4.
+// A record of 128 modes has 2163 bytes, an impulse between two bodies 33, the number of a constraint that
+// broke 4.
 std::int64_t largest_message(const WorldScene& scene) {
     constexpr std::size_t kRest = 1 << 20, kBody = 8192, kConstraint = 8, kLargest = 256 << 20;
     const std::size_t bodies = scene.world.bodies.size() + scene.later.size();
@@ -36,13 +37,14 @@ Coordinator::Coordinator(const WorldScene& scene, const DistributedSettings& set
       observer_(&observer),
       view_(scene),
       columns_(scene),
-      planned_(scene, columns_.side(), structure_outlook(settings.bound, scene.world.settings.dt)),
-      lots_(joined_lots(scene)),
+      structures_(scene, columns_.side(), structure_outlook(settings.bound, scene.world.settings.dt)),
+      groups_(tied_groups(scene)),
       check_(with_later(scene), scene.world.constraints.size(), settings.steps) {
     const SharedWorld all = with_later(scene);
     for (int i = 0; i < all.bodies(); ++i)
         bodies_.push_back({kApplication, view_.clock().born(i), all.record(i), 0});
-    result_.one_owner = !are_alike(all, lots_, structures(view_.world(), there_now(), columns_.side()));
+    result_.one_owner =
+        !are_alike(all, groups_, structures(view_.world(), existing_bodies(), columns_.side()));
     if (result_.one_owner) settings_.market.trade = false;
 }
 
@@ -54,7 +56,7 @@ void Coordinator::send(std::vector<std::uint32_t> to, const WorkerMessage& messa
 
 std::vector<Coordinator::Outgoing> Coordinator::outgoing() {
     for (const std::uint32_t worker : std::exchange(gone_, {}))
-        senders_[worker].decoded = {}, senders_[worker].told = {};
+        senders_[worker].decoded = {}, senders_[worker].sent = {};
     return std::exchange(queue_, {});
 }
 
@@ -84,21 +86,21 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
     if (finished_) {
         send({worker}, EndOfRun{});
     } else if (started_) {
-        catch_up(worker);
+        send_history(worker);
         ++epoch_;
         send(members_, Members{members_, true});
         while (!orphans_.empty()) {
             const auto orphans = std::move(orphans_.back());
             orphans_.pop_back();
-            share_out(orphans.second, orphans.first);
+            distribute(orphans.second, orphans.first);
         }
         send(members_, Members{members_});
     }
     return worker;
 }
 
-// What has been up to the view's step, then who owns what.
-void Coordinator::catch_up(std::uint32_t worker) {
+// Sends what happened up to the view's step, then the owners.
+void Coordinator::send_history(std::uint32_t worker) {
     PastMessage past{{}, {sales_.begin(), sales_.end()}};
     for (std::size_t c = 0; c < scene_.world.constraints.size(); ++c)
         if (!view_.world().constraint_holds(static_cast<int>(c)))
@@ -107,28 +109,29 @@ void Coordinator::catch_up(std::uint32_t worker) {
     std::vector<int> all;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i)
         if (view_.clock().moves(i) && owner(i) != kApplication) all.push_back(i);
-    for (const Group& group : groups(all)) send({worker}, ownership(group));
+    for (const Group& group : by_owner(all)) send({worker}, ownership(group));
 }
 
 void Coordinator::start() {
     started_ = true;
     observer_->at(view_.step(), view_.world());
-    tell_ready();
+    begin_next_step();
     send(members_, Members{members_, true});
-    if (members_.empty()) {  // all lost before: the next to join gets everything
+    if (members_.empty()) {  // all were lost before the start: the next worker that joins gets everything
         std::vector<int> all;
-        for (const std::vector<int>& lot : lots_) all.insert(all.end(), lot.begin(), lot.end());
+        for (const std::vector<int>& group : groups_) all.insert(all.end(), group.begin(), group.end());
         std::ranges::sort(all);
         orphans_.emplace_back(kApplication, std::move(all));
     } else {
-        const std::vector<std::uint32_t> stay = staying(), &owners = stay.empty() ? members_ : stay;
+        const std::vector<std::uint32_t> staying = staying_members(),
+                                         &owners = staying.empty() ? members_ : staying;
         const int workers = settings_.all_to_first ? 1 : static_cast<int>(owners.size());
-        const std::vector<std::vector<int>> lots = whole_lots();
-        const std::vector<int> first = first_owners(columns_, lots, places(lots), workers);
+        const std::vector<std::vector<int>> groups = whole_groups();
+        const std::vector<int> first = first_owners(columns_, groups, places(groups), workers);
         std::vector<std::vector<int>> bodies(owners.size());
-        for (std::size_t i = 0; i < lots.size(); ++i) {
-            auto& mine = bodies[static_cast<std::size_t>(first[i])];
-            mine.insert(mine.end(), lots[i].begin(), lots[i].end());
+        for (std::size_t i = 0; i < groups.size(); ++i) {
+            auto& share = bodies[static_cast<std::size_t>(first[i])];
+            share.insert(share.end(), groups[i].begin(), groups[i].end());
         }
         for (std::size_t i = 0; i < owners.size(); ++i) register_owner(bodies[i], owners[i], kApplication);
     }
@@ -138,7 +141,7 @@ void Coordinator::start() {
 
 // The register.
 
-std::vector<Coordinator::Group> Coordinator::groups(const std::vector<int>& bodies) const {
+std::vector<Coordinator::Group> Coordinator::by_owner(const std::vector<int>& bodies) const {
     std::vector<Group> groups;
     for (const int body : bodies) {
         const Body& b = bodies_[static_cast<std::size_t>(body)];
@@ -150,7 +153,7 @@ std::vector<Coordinator::Group> Coordinator::groups(const std::vector<int>& bodi
             found->bodies.push_back(body);
         }
     }
-    // Who owned nothing begins with the first.
+    // A worker that owned nothing begins at the step of the first group.
     std::sort(groups.begin(), groups.end(), [](const Group& a, const Group& b) {
         return std::pair(a.step, a.bodies.front()) < std::pair(b.step, b.bodies.front());
     });
@@ -169,13 +172,14 @@ Ownership Coordinator::ownership(const Group& group) const {
 void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t owner, std::uint32_t from,
                                  bool traded) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = owner;
-    for (const Group& group : groups(bodies)) {
+    for (const Group& group : by_owner(bodies)) {
         ++epoch_;
         for (const int body : group.bodies) {
             Body& b = bodies_[static_cast<std::size_t>(body)];
             b.epoch = epoch_, b.asked_to = kApplication;
         }
-        if (owner != kApplication) senders_[owner].got = std::max(senders_[owner].got, group.step);
+        if (owner != kApplication)
+            senders_[owner].gained_at = std::max(senders_[owner].gained_at, group.step);
         Ownership message = ownership(group);
         message.from = from;
         message.traded = traded;
@@ -189,7 +193,7 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
             std::vector<std::uint32_t> others = members_;
             std::erase(others, owner);
             send(std::move(others), message);
-            add_what_is_around(message);
+            add_surroundings(message);
             send({owner}, message);
         } else {
             send(members_, message);
@@ -199,8 +203,8 @@ void Coordinator::register_owner(const std::vector<int>& bodies, std::uint32_t o
     }
 }
 
-// For its owner, to whom others have told only what was near it before.
-void Coordinator::add_what_is_around(Ownership& message) const {
+// Adds others' bodies near these for their new owner, which received only bodies near its former ones.
+void Coordinator::add_surroundings(Ownership& message) const {
     const WorldSettings& settings = scene_.world.settings;
     const double time =
         std::max(near_steps(settings_.bound) * settings.dt, structure_outlook(settings_.bound, settings.dt));
@@ -217,70 +221,56 @@ void Coordinator::add_what_is_around(Ownership& message) const {
     }
 }
 
-std::vector<int> Coordinator::there_now() const {
-    std::vector<int> there;
+std::vector<int> Coordinator::existing_bodies() const {
+    std::vector<int> bodies;
     for (int i = 0; i < view_.world().bodies(); ++i)
-        if (view_.clock().moves_at(i, view_.step())) there.push_back(i);
-    return there;
+        if (view_.clock().moves_at(i, view_.step())) bodies.push_back(i);
+    return bodies;
 }
 
-// Now or soon, or once events have completed them.
-std::vector<std::vector<int>> Coordinator::flat_structures_now() const {
-    std::vector<std::vector<int>> found =
-        flat_structures(view_.world(), there_now(), columns_.side(),
-                        structure_outlook(settings_.bound, scene_.world.settings.dt));
-    planned_.add_unfinished(view_.world().bodies(), found);
-    return found;
-}
-
-// What a structure joins is one.
-std::vector<std::vector<int>> Coordinator::whole_lots() const {
-    std::vector<int> first(lots_.size());
-    if (!result_.one_owner) {
-        std::vector<std::vector<int>> whole = flat_structures_now();
-        for (std::vector<int>& some : structures(view_.world(), there_now(), columns_.side()))
-            whole.push_back(std::move(some));
-        first = joined_by(whole, lots_);
+// Groups of bodies that need one owner: tied bodies, joined by structures.
+std::vector<std::vector<int>> Coordinator::whole_groups() const {
+    std::vector<int> first(groups_.size());
+    if (!result_.one_owner) first = joined_by(structures_.all(view_.world(), existing_bodies()), groups_);
+    std::vector<std::vector<int>> groups(groups_.size());
+    for (std::size_t i = 0; i < groups_.size(); ++i) {
+        std::vector<int>& group = groups[static_cast<std::size_t>(first[i])];
+        group.insert(group.end(), groups_[i].begin(), groups_[i].end());
     }
-    std::vector<std::vector<int>> lots(lots_.size());
-    for (std::size_t i = 0; i < lots_.size(); ++i) {
-        std::vector<int>& lot = lots[static_cast<std::size_t>(first[i])];
-        lot.insert(lot.end(), lots_[i].begin(), lots_[i].end());
-    }
-    std::erase_if(lots, [](const std::vector<int>& lot) { return lot.empty(); });
-    return lots;
+    std::erase_if(groups, [](const std::vector<int>& group) { return group.empty(); });
+    return groups;
 }
 
-// Of each lot.
-std::vector<Eigen::Vector3d> Coordinator::places(const std::vector<std::vector<int>>& lots) const {
+// Mean position of each group.
+std::vector<Eigen::Vector3d> Coordinator::places(const std::vector<std::vector<int>>& groups) const {
     std::vector<Eigen::Vector3d> places;
-    for (const std::vector<int>& lot : lots) {
+    for (const std::vector<int>& group : groups) {
         Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        for (const int body : lot) sum += bodies_[static_cast<std::size_t>(body)].record.state.position;
-        places.emplace_back(sum / static_cast<double>(lot.size()));
+        for (const int body : group) sum += bodies_[static_cast<std::size_t>(body)].record.state.position;
+        places.emplace_back(sum / static_cast<double>(group.size()));
     }
     return places;
 }
 
-// Neighbouring columns go to one worker, the one with the fewest bodies, until it has its share.
-std::map<std::uint32_t, std::vector<int>> Coordinator::shares(
+// Neighbouring columns go to the worker with the fewest bodies until it has its share, then to the next.
+std::map<std::uint32_t, std::vector<int>> Coordinator::plan_distribution(
     const std::vector<int>& bodies, const std::vector<std::uint32_t>& workers) const {
     std::map<std::uint32_t, std::size_t> count;
     std::size_t all = bodies.size();
     for (const std::uint32_t worker : workers) all += count[worker] = owned_by(worker).size();
-    const std::vector<std::vector<int>> lots = whole_lots();
-    const std::vector<Eigen::Vector3d> all_places = places(lots);
+    const std::vector<std::vector<int>> groups = whole_groups();
+    const std::vector<Eigen::Vector3d> all_places = places(groups);
     const std::vector<std::optional<Eigen::Vector3d>> where(all_places.begin(), all_places.end());
-    std::vector<std::optional<Column>> column(lots.size());
+    std::vector<std::optional<Column>> column(groups.size());
     columns_.assign(where, column);
-    std::map<Column, std::vector<int>> stands;
-    for (std::size_t i = 0; i < lots.size(); ++i)
-        for (const int body : lots[i])
-            if (std::binary_search(bodies.begin(), bodies.end(), body)) stands[*column[i]].push_back(body);
+    std::map<Column, std::vector<int>> by_column;
+    for (std::size_t i = 0; i < groups.size(); ++i)
+        for (const int body : groups[i])
+            if (std::ranges::binary_search(bodies, body)) by_column[*column[i]].push_back(body);
     std::map<std::uint32_t, std::vector<int>> plan;
     const auto bodies_of = [](const auto& c) { return c.second; };
     auto to = count.end();
-    for (const auto& [at, some] : stands) {
+    for (const auto& [at, some] : by_column) {
         if (to == count.end() || to->second * workers.size() >= all)
             to = result_.one_owner ? std::ranges::max_element(count, {}, bodies_of)
                                    : std::ranges::min_element(count, {}, bodies_of);
@@ -291,19 +281,19 @@ std::map<std::uint32_t, std::vector<int>> Coordinator::shares(
     return plan;
 }
 
-void Coordinator::share_out(const std::vector<int>& bodies, std::uint32_t from) {
+void Coordinator::distribute(const std::vector<int>& bodies, std::uint32_t from) {
     for (const int body : bodies) bodies_[static_cast<std::size_t>(body)].owner = kApplication;
     if (members_.empty()) {
         if (!bodies.empty()) orphans_.emplace_back(from, bodies);
         return;
     }
-    const std::vector<std::uint32_t> others = staying();
-    for (const auto& [worker, share] : shares(bodies, others.empty() ? members_ : others))
+    const std::vector<std::uint32_t> others = staying_members();
+    for (const auto& [worker, share] : plan_distribution(bodies, others.empty() ? members_ : others))
         register_owner(share, worker, from);
 }
 
-// Of those who do not leave; or who leaves last, if all do.
-std::vector<std::uint32_t> Coordinator::staying() const {
+// Members that do not want to leave. If all of several do, the last one stays longest.
+std::vector<std::uint32_t> Coordinator::staying_members() const {
     std::vector<std::uint32_t> workers;
     std::ranges::copy_if(members_, std::back_inserter(workers),
                          [this](std::uint32_t worker) { return !leaving_.contains(worker); });
@@ -314,15 +304,15 @@ std::vector<std::uint32_t> Coordinator::staying() const {
 void Coordinator::remove(std::uint32_t worker) {
     std::erase(members_, worker);
     leaving_.erase(worker);
-    std::erase_if(bought_,
+    std::erase_if(awaited_,
                   [worker](const auto& w) { return w.first.first == worker || w.first.second == worker; });
     for (Body& body : bodies_)
         if (body.asked_to == worker) body.asked_at = 0, body.asked_to = kApplication;
     gone_.push_back(worker);
     if (started_) send(members_, Members{members_, true});
-    share_out(owned_by(worker), worker);
+    distribute(owned_by(worker), worker);
     if (started_) send(members_, Members{members_});
-    ask_who_leaves();
+    ask_leaving_members();
     advance();
 }
 
@@ -336,13 +326,13 @@ void Coordinator::lose(std::uint32_t worker, const std::string& why) {
 }
 
 void Coordinator::note_waiting() {
-    for (auto& [who, for_long] : bought_) for_long = true;
+    for (auto& [pair, for_long] : awaited_) for_long = true;
 }
 
-// Whether a member has told another one of all steps that it has published.
-bool Coordinator::has_told(std::uint32_t worker, std::uint32_t other) {
+// Whether a member has sent another one the border data of all steps that it has published.
+bool Coordinator::has_sent_all(std::uint32_t worker, std::uint32_t other) {
     Sender& sender = senders_[worker];
-    return sender.told[other] >= sender.step;
+    return sender.sent[other] >= sender.step;
 }
 
 void Coordinator::lose_slowest(const std::string& why) {
@@ -358,10 +348,10 @@ void Coordinator::lose_slowest(const std::string& why) {
     for (std::set<std::uint32_t> seen = {worker};;) {
         const auto next = std::ranges::find_if(members_, [&](std::uint32_t to) {
             if (seen.contains(to)) return false;
-            const auto bought = bought_.find({worker, to});
-            // Who sold may wait for what the buyer has not told it.
-            return !has_told(to, worker) ||
-                   (bought != bought_.end() && bought->second && has_told(worker, to));
+            const auto sale = awaited_.find({worker, to});
+            // The seller may itself wait for border data of the buyer.
+            return !has_sent_all(to, worker) ||
+                   (sale != awaited_.end() && sale->second && has_sent_all(worker, to));
         });
         if (next == members_.end()) break;
         worker = *next;
@@ -376,66 +366,67 @@ void Coordinator::advance() {
     while (started_ && !finished_) {
         if (settings_.until_rest && view_.at_rest()) return end(true);
         if (view_.step() >= settings_.steps) return end(false);
-        release();
+        release_settled();
         if (!view_.advance()) return;
-        gather(), ask_who_leaves();
+        consolidate_structures(), ask_leaving_members();
         observer_->at(view_.step(), view_.world());
-        tell_ready();
+        begin_next_step();
     }
 }
 
-void Coordinator::tell_ready() {
+void Coordinator::begin_next_step() {
     if (view_.step() < settings_.steps) view_.begin();
     observer_->ready(view_.step(), view_.world());
 }
 
-// Flat structures that form while several own them: whoever has most of one is to have all of it. Balls rest as well with
-// several owners.
-void Coordinator::gather() {
-    if (result_.one_owner || members_.size() < 2 || view_.step() % kGatherEvery != 0) return;
-    const std::vector<std::vector<int>> found = flat_structures_now();
+// Asks the owners of a flat structure to give their bodies to the worker that owns most of it. Balls rest as
+// well with several owners.
+void Coordinator::consolidate_structures() {
+    if (result_.one_owner || members_.size() < 2 || view_.step() % kConsolidateEvery != 0) return;
+    const std::vector<std::vector<int>> found = structures_.flat(view_.world(), existing_bodies());
     if (found.empty()) return;
-    const std::vector<int> first = joined_by(found, lots_);
-    std::map<int, std::map<std::uint32_t, std::vector<std::uint32_t>>> owners;  // bodies of each
-    for (std::size_t i = 0; i < lots_.size(); ++i)
-        for (const int body : lots_[i])
+    const std::vector<int> first = joined_by(found, groups_);
+    std::map<int, std::map<std::uint32_t, std::vector<std::uint32_t>>> owners;  // structures, owners, bodies
+    for (std::size_t i = 0; i < groups_.size(); ++i)
+        for (const int body : groups_[i])
             owners[first[i]][owner(body)].push_back(static_cast<std::uint32_t>(body));
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>> asked;  // from, to
-    for (const auto& [lot, shares] : owners) {
+    for (const auto& [structure, shares] : owners) {
         if (shares.size() < 2) continue;
         const auto most =
             std::ranges::max_element(shares, {}, [](const auto& share) { return share.second.size(); });
-        if (!is_member(most->first) || leaving_.contains(most->first)) continue;  // it gives away what it has
+        if (!is_member(most->first) || leaving_.contains(most->first)) continue;
         for (const auto& [from, bodies] : shares)
             if (from != most->first && is_member(from))
                 std::ranges::copy_if(bodies, std::back_inserter(asked[{from, most->first}]),
-                                     [&](std::uint32_t body) { return ask_for(body, most->first); });
+                                     [&](std::uint32_t body) { return mark_asked(body, most->first); });
     }
-    for (auto& [who, bodies] : asked)
-        if (!bodies.empty()) send({who.first}, Gather{who.second, std::move(bodies)});
+    for (auto& [pair, bodies] : asked)
+        if (!bodies.empty()) send({pair.first}, Gather{pair.second, std::move(bodies)});
 }
 
-// For all that its owner has. Where nobody else stays it hands that over.
-void Coordinator::ask_who_leaves() {
-    const std::vector<std::uint32_t> others = staying();
+// Asks members that want to leave for all their bodies. If no other member stays, it hands them over to the
+// application.
+void Coordinator::ask_leaving_members() {
+    const std::vector<std::uint32_t> others = staying_members();
     for (const std::uint32_t worker : leaving_) {
         if (others.empty()) {
             send({worker}, Gather{kApplication, {}});
             continue;
         }
-        if (worker == others.back()) continue;  // the last
-        for (const auto& [to, share] : shares(owned_by(worker), others)) {
+        if (worker == others.back()) continue;
+        for (const auto& [to, share] : plan_distribution(owned_by(worker), others)) {
             Gather asked{to, {}};
             for (const int body : share)
-                if (ask_for(static_cast<std::uint32_t>(body), to))
+                if (mark_asked(static_cast<std::uint32_t>(body), to))
                     asked.bodies.push_back(static_cast<std::uint32_t>(body));
             if (!asked.bodies.empty()) send({worker}, asked);
         }
     }
 }
 
-// Unless it was asked not long ago: a sale takes some steps.
-bool Coordinator::ask_for(std::uint32_t body, std::uint32_t to) {
+// Whether to ask for a body now: not if that was done some steps ago, as a sale takes some steps.
+bool Coordinator::mark_asked(std::uint32_t body, std::uint32_t to) {
     Body& b = bodies_[body];
     if (!view_.clock().moves_at(static_cast<int>(body), view_.step()) ||
         (b.asked_at > 0 && view_.step() < b.asked_at + gather_patience(settings_.bound)))
@@ -444,13 +435,14 @@ bool Coordinator::ask_for(std::uint32_t body, std::uint32_t to) {
     return true;
 }
 
-// A body that came to a worker after its last step is published no more.
-void Coordinator::release() {
+// A worker that has published the last step again publishes nothing more. The view need not wait for bodies
+// that it got after that.
+void Coordinator::release_settled() {
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) {
         const auto sender = senders_.find(owner(i));
         if (sender == senders_.end() || !sender->second.settled) continue;
         const Body& body = bodies_[static_cast<std::size_t>(i)];
-        if (body.step == settings_.steps) view_.take(body.step, {body.record});
+        if (body.step == settings_.steps) view_.add(body.step, {body.record});
         view_.release(i);
     }
 }
@@ -460,22 +452,22 @@ void Coordinator::end(bool rest) {
     result_.steps = view_.step();
     result_.rest_reached = rest;
     result_.counts = view_.world().counts();
-    name_mishaps(result_);
+    list_mishaps(result_);
     for (const auto& [worker, impulse] : outside_) result_.outside_impulse += impulse;
     send(members_, EndOfRun{});
 }
 
-// Those of the steps that all have done, in order of steps.
-void Coordinator::name_mishaps(DistributedResult& result) const {
+// Lists the mishaps of steps that all bodies have done, in order of steps.
+void Coordinator::list_mishaps(DistributedResult& result) const {
     const auto in_order = [&](const auto& a, const auto& b) { return a.step < b.step; };
     for (const auto& [body, q] : quarantined_)
         if (q.step <= result.steps) result.quarantined.push_back(q);
     std::stable_sort(result.quarantined.begin(), result.quarantined.end(), in_order);
-    for (const auto& [told, named] :
+    for (const auto& [reported, listed] :
          {std::pair(&limited_, &result.limited), std::pair(&broken_, &result.broken)}) {
-        for (const auto& [number, step] : *told)
-            if (step <= result.steps) named->push_back({number, step});
-        std::stable_sort(named->begin(), named->end(), in_order);
+        for (const auto& [number, step] : *reported)
+            if (step <= result.steps) listed->push_back({number, step});
+        std::stable_sort(listed->begin(), listed->end(), in_order);
     }
 }
 

@@ -22,7 +22,7 @@ struct Site {
     }
 };
 
-// Whether a region is longer across the second direction.
+// Whether a region is longer in the second direction.
 bool is_deep(std::span<const Site> some) {
     const auto extent = [&](int Column::*axis) {
         const auto [least, most] =
@@ -32,7 +32,7 @@ bool is_deep(std::span<const Site> some) {
     return extent(&Column::y) > extent(&Column::x);
 }
 
-// Where to cut so that the first part has about `share` of the bodies.
+// The place to cut at, so that the first part has about `share` of the bodies.
 std::size_t cut(std::span<const Site> some, double share) {
     double all = 0, sum = 0;
     for (const Site& site : some) all += site.bodies;
@@ -59,7 +59,7 @@ void bisect(std::span<Site> some, int first, int workers, std::map<Column, int>&
 
 }  // namespace
 
-std::vector<std::vector<int>> joined_lots(const WorldScene& scene) {
+std::vector<std::vector<int>> tied_groups(const WorldScene& scene) {
     const std::size_t bodies = scene.world.bodies.size() + scene.later.size();
     DisjointSets sets(bodies);
     auto moves = [&](int body) { return body >= 0 && body_of(scene, body).moves(); };
@@ -67,24 +67,24 @@ std::vector<std::vector<int>> joined_lots(const WorldScene& scene) {
         if (!moves(c.body_a) || !moves(c.body_b)) continue;
         sets.join(c.body_a, c.body_b);
     }
-    std::vector<std::vector<int>> lots;
-    std::vector<std::size_t> lot_of(bodies);
+    std::vector<std::vector<int>> groups;
+    std::vector<std::size_t> group_of(bodies);
     for (int i = 0; i < static_cast<int>(bodies); ++i) {
         if (!moves(i)) continue;
         const int first = sets.first(i);
-        if (first == i) lot_of[static_cast<std::size_t>(i)] = lots.size(), lots.emplace_back();
-        lots[lot_of[static_cast<std::size_t>(first)]].push_back(i);
+        if (first == i) group_of[static_cast<std::size_t>(i)] = groups.size(), groups.emplace_back();
+        groups[group_of[static_cast<std::size_t>(first)]].push_back(i);
     }
-    return lots;
+    return groups;
 }
 
-std::vector<int> first_owners(const Columns& columns, const std::vector<std::vector<int>>& lots,
+std::vector<int> first_owners(const Columns& columns, const std::vector<std::vector<int>>& groups,
                               const std::vector<Eigen::Vector3d>& places, int workers) {
-    const std::vector<std::optional<Eigen::Vector3d>> there(places.begin(), places.end());
-    std::vector<std::optional<Column>> column(lots.size());
-    columns.assign(there, column);
+    const std::vector<std::optional<Eigen::Vector3d>> all(places.begin(), places.end());
+    std::vector<std::optional<Column>> column(groups.size());
+    columns.assign(all, column);
     std::map<Column, int> bodies, owner;
-    for (std::size_t i = 0; i < lots.size(); ++i) bodies[*column[i]] += static_cast<int>(lots[i].size());
+    for (std::size_t i = 0; i < groups.size(); ++i) bodies[*column[i]] += static_cast<int>(groups[i].size());
     std::vector<Site> sites;
     for (const auto& [where, count] : bodies) sites.push_back({where, count});
     bisect(sites, 0, workers, owner);

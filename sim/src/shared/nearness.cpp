@@ -6,32 +6,32 @@
 namespace sim {
 
 Eigen::AlignedBox3f box_of_way(const WorldBodyState& state, double radius, const Outlook& outlook) {
-    // Of two bodies one may fall from the other: half of that for each.
+    // One of two bodies may fall away from the other. Each box takes half of that distance.
     const double fall = outlook.gravity * outlook.time * outlook.time / 2,
                  around = radius + outlook.dt * state.velocity.norm() + fall / 2;
-    const Eigen::Vector3d there = state.position + outlook.time * state.velocity;
-    const Eigen::Array3d low = state.position.cwiseMin(there).array() - around,
-                         high = state.position.cwiseMax(there).array() + around;
+    const Eigen::Vector3d end = state.position + outlook.time * state.velocity;
+    const Eigen::Array3d low = state.position.cwiseMin(end).array() - around,
+                         high = state.position.cwiseMax(end).array() + around;
     if (!(low > -kFurthestReach).all() || !(high < kFurthestReach).all()) return {};
     return {low.cast<float>().matrix(), high.cast<float>().matrix()};
 }
 
 namespace {
 
-constexpr int kParts = 8;  // of a side
+constexpr int kParts = 8;  // into which a side is cut
 
 struct Parts {
-    int first, last;  // none, if first is beyond
+    int first, last;
 };
 
-// Those of a side that a box touches.
+// The parts of a side that a box touches.
 Parts parts_of(const Eigen::AlignedBox3f& box, const Eigen::AlignedBox3f& all, Eigen::Index side) {
     const float length = std::max(all.sizes()[side], 1e-6F);
     const auto part = [&](float at) {
         return std::floor(static_cast<float>(kParts) * (at - all.min()[side]) / length);
     };
     const float low = part(box.min()[side]), high = part(box.max()[side]), last = kParts - 1;
-    // What ends at the border counts there.
+    // A box that ends at the border lies in the last part.
     return {static_cast<int>(std::clamp(low, 0.F, last)), static_cast<int>(std::clamp(high, 0.F, last))};
 }
 

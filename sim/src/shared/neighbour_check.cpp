@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "shared/foreign_bodies.h"
+
 namespace sim {
 
 NeighbourCheck::NeighbourCheck(const World& all, std::size_t constraints, std::uint64_t steps)
@@ -15,16 +17,8 @@ void NeighbourCheck::check(const std::vector<CrossImpulse>& crossed) const {
     for (const CrossImpulse& c : crossed)
         if (!moves(static_cast<std::uint32_t>(c.own)) || !moves(static_cast<std::uint32_t>(c.ghost)))
             throw DecodeError("found an impulse between bodies that are none");
-    const auto pair_of = [](const CrossImpulse& c) { return std::pair(c.own, c.ghost); };
-    if (std::ranges::adjacent_find(crossed, std::ranges::greater_equal{}, pair_of) != crossed.end())
+    if (std::ranges::adjacent_find(crossed, std::ranges::greater_equal{}, bodies_of) != crossed.end())
         throw DecodeError("found impulses that are not in order");
-}
-
-void NeighbourCheck::check_constraints(const std::vector<std::uint32_t>& broken) const {
-    for (const std::uint32_t constraint : broken)
-        if (constraint >= constraints_)
-            throw DecodeError("found constraint " + std::to_string(constraint) + ", expected one of " +
-                              std::to_string(constraints_));
 }
 
 void NeighbourCheck::check(const MessageHeader& header, const NeighbourMessage& message) const {
@@ -41,7 +35,10 @@ void NeighbourCheck::check(const MessageHeader& header, const NeighbourMessage& 
     for (const NeighbourMessage::Place& place : message.places)
         if (!moves(place.body)) throw DecodeError("found the place of a body that is none");
     check(message.crossed);
-    check_constraints(message.broken);
+    for (const std::uint32_t constraint : message.broken)
+        if (constraint >= constraints_)
+            throw DecodeError("found constraint " + std::to_string(constraint) + ", expected one of " +
+                              std::to_string(constraints_));
 }
 
 void NeighbourCheck::check(const MessageHeader& header, const FoundMessage& message) const {

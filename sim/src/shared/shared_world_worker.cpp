@@ -1,6 +1,7 @@
 #include "shared/shared_world_worker.h"
 
 #include <algorithm>
+#include <type_traits>
 #include <utility>
 
 #include "shared/structures.h"
@@ -8,17 +9,17 @@
 namespace sim {
 namespace {
 
+// Mishaps of own bodies and constraints in a step.
 std::vector<Mishap> mishaps_of(const SharedWorld& world, std::uint64_t step) {
     std::vector<Mishap> mishaps;
+    const auto add = [&](Mishap::Kind kind, int number, std::uint64_t at, const std::string& what) {
+        if (at == step && (kind == Mishap::Kind::broken || world.own(number)))
+            mishaps.push_back({kind, static_cast<std::uint32_t>(number), step, what});
+    };
     for (const QuarantinedBody& q : world.quarantined())
-        if (q.step == step && world.own(q.body))
-            mishaps.push_back({Mishap::Kind::quarantined, static_cast<std::uint32_t>(q.body), step, q.what});
-    for (const FirstStep& first : world.limited())
-        if (first.step == step && world.own(first.number))
-            mishaps.push_back({Mishap::Kind::limited, static_cast<std::uint32_t>(first.number), step, {}});
-    for (const FirstStep& first : world.broken())
-        if (first.step == step)
-            mishaps.push_back({Mishap::Kind::broken, static_cast<std::uint32_t>(first.number), step, {}});
+        add(Mishap::Kind::quarantined, q.body, q.step, q.what);
+    for (const FirstStep& first : world.limited()) add(Mishap::Kind::limited, first.number, first.step, {});
+    for (const FirstStep& first : world.broken()) add(Mishap::Kind::broken, first.number, first.step, {});
     return mishaps;
 }
 
@@ -28,58 +29,46 @@ SharedWorldWorker::SharedWorldWorker(const SceneMessage& scene)
     : self_(scene.worker),
       exchange_(scene),
       market_(scene.worker, scene.settings.market, scene.settings.bound),
-      // The step of the application's view is behind this worker's by the bound and one at most.
-      forgets_after_(gather_patience(scene.settings.bound) +
+      // The application's view is behind this worker by at most the bound and one step.
+      requests_hold_(gather_patience(scene.settings.bound) +
                      static_cast<std::uint64_t>(scene.settings.bound) + 1) {
     for (const WorldEvent& event : scene.scene.events)
         if (!event.slowing.empty()) events_.push_back(event);
     exchange_.send_by([this](std::vector<std::uint8_t>&& bytes) { queue_.push_back(std::move(bytes)); });
     exchange_.report_to([this](const MessageHeader& header, double smoothed_s, std::uint32_t own) {
-        market_.heard(header, smoothed_s, own);
+        market_.receive_report(header, smoothed_s, own);
     });
 }
 
-void SharedWorldWorker::take(const MessageHeader& header, WorkerMessage&& message) {
+void SharedWorldWorker::receive(const MessageHeader& header, WorkerMessage&& message) {
     if (left_ || ended_) return;
-    std::visit([&](auto&& m) { take_message(header, std::forward<decltype(m)>(m)); }, std::move(message));
+    std::visit([&](auto&& m) { handle(header, std::forward<decltype(m)>(m)); }, std::move(message));
     if (left_ || ended_) return;
-    exchange_.follow();
-    if (exchange_.owes()) publish({});
+    exchange_.advance_without_bodies();
+    if (exchange_.must_publish()) publish({});
     trade();  // the next step may have to wait for the buyer
 }
 
-void SharedWorldWorker::take_message(const MessageHeader& header, Members&& message) {
+void SharedWorldWorker::handle(const MessageHeader& header, Members&& message) {
     epoch_ = header.epoch;
-    market_.members(message.workers);
-    exchange_.members(message, epoch_);
+    market_.set_members(message.workers);
+    exchange_.set_members(message, epoch_);
     std::erase_if(sellers_, [&message](const auto& seller) {
-        return std::find(message.workers.begin(), message.workers.end(), seller.first) ==
-               message.workers.end();
+        return std::ranges::find(message.workers, seller.first) == message.workers.end();
     });
 }
 
-void SharedWorldWorker::take_message(const MessageHeader& header, Ownership&& message) {
+void SharedWorldWorker::handle(const MessageHeader& header, Ownership&& message) {
     epoch_ = header.epoch;
-    market_.registered(header.epoch, message);
+    market_.register_sale(header.epoch, message);
     if (message.owner == self_) sellers_.erase(message.from);
-    exchange_.own(message, header.epoch);
+    exchange_.set_owner(message, header.epoch);
 }
 
-void SharedWorldWorker::take_message(const MessageHeader& header, PastMessage&& message) {
-    exchange_.take(header, message);
-}
-
-void SharedWorldWorker::take_message(const MessageHeader& header, NeighbourMessage&& message) {
-    exchange_.take(header, std::move(message));
-}
-
-void SharedWorldWorker::take_message(const MessageHeader& header, FoundMessage&& message) {
-    exchange_.take(header, std::move(message));
-}
-
-void SharedWorldWorker::take_message(const MessageHeader& header, Offer&& message) {
+void SharedWorldWorker::handle(const MessageHeader& header, Offer&& message) {
     OfferAnswer answer = {header.worker, message.number, false};
-    // Who has nothing begins where its first seller is, which others may be behind.
+    // A worker without bodies begins at the step of its first seller. A second seller may be behind that
+    // step.
     const bool begins = exchange_.has_nothing() && !sellers_.empty();
     if ((!draining_ || message.gathers) && !exchange_.at_end() && !begins)
         answer = market_.answer(header.worker, message);
@@ -87,59 +76,49 @@ void SharedWorldWorker::take_message(const MessageHeader& header, Offer&& messag
     send(answer);
 }
 
-void SharedWorldWorker::take_message(const MessageHeader& header, OfferAnswer&& message) {
-    if (market_.answered(header.worker, message)) handover_step_ = header.step + 1;
+void SharedWorldWorker::handle(const MessageHeader& header, OfferAnswer&& message) {
+    if (market_.receive_answer(header.worker, message)) handover_step_ = header.step + 1;
 }
 
-// What was asked for last counts.
-void SharedWorldWorker::take_message(const MessageHeader& header, Gather&& message) {
+// The last request for a body replaces earlier ones.
+void SharedWorldWorker::handle(const MessageHeader& header, Gather&& message) {
     if (message.to == kApplication) {
         gives_up_ = draining_;
         return;
     }
-    for (Asked& before : gathers_)
+    for (Request& before : requests_)
         std::erase_if(before.what.bodies, [&message](std::uint32_t body) {
             return std::ranges::find(message.bodies, body) != message.bodies.end();
         });
-    std::erase_if(gathers_, [](const Asked& asked) { return asked.what.bodies.empty(); });
-    gathers_.push_back({header.step, std::move(message)});
-}
-
-void SharedWorldWorker::take_message(const MessageHeader& header, EndOfRun&& message) {
-    (void)header, (void)message;
-    ended_ = true;
-}
-
-void SharedWorldWorker::take_message(const MessageHeader& header, Refusal&& message) {
-    (void)header, (void)message;
-    ended_ = true;
-}
-
-void SharedWorldWorker::take_message(const MessageHeader& header, Beat&& message) {
-    (void)header, (void)message;
+    std::erase_if(requests_, [](const Request& request) { return request.what.bodies.empty(); });
+    requests_.push_back({header.step, std::move(message)});
 }
 
 template <typename Other>
-void SharedWorldWorker::take_message(const MessageHeader& header, Other&& message) {
-    (void)header, (void)message;
-    throw DecodeError("found a message that no worker gets, expected one for a worker");
+void SharedWorldWorker::handle(const MessageHeader& header, Other&& message) {
+    using Message = std::remove_cvref_t<Other>;
+    if constexpr (requires { exchange_.receive(header, std::move(message)); })
+        exchange_.receive(header, std::move(message));
+    else if constexpr (std::is_same_v<Message, EndOfRun> || std::is_same_v<Message, Refusal>)
+        ended_ = true;
+    else if constexpr (!std::is_same_v<Message, Beat>)
+        throw DecodeError("found a message that no worker gets, expected one for a worker");
 }
 
 bool SharedWorldWorker::ready() const {
-    const bool bodies_are_due = std::ranges::any_of(
-        sellers_, [this](const auto& seller) { return last_before(seller) <= exchange_.steps_done(); });
-    return !left_ && !ended_ && !bodies_are_due && !hands_over() && !market_.awaits_answer() &&
+    return !left_ && !ended_ && !is_at_purchase() && !is_at_handover() && !market_.awaits_answer() &&
            exchange_.ready();
 }
 
-// The step that this worker does not pass before the bodies come that it bought.
-std::uint64_t SharedWorldWorker::last_before(
-    const std::pair<const std::uint32_t, std::uint64_t>& seller) const {
-    return std::max(seller.second, exchange_.steps_of(seller.first));
+// Whether this worker has to wait here for bodies that it bought.
+bool SharedWorldWorker::is_at_purchase() const {
+    return std::ranges::any_of(sellers_, [this](const auto& seller) {
+        return std::max(seller.second, exchange_.steps_of(seller.first)) <= exchange_.steps_done();
+    });
 }
 
-// It sold bodies, and is at the step at which they change owners.
-bool SharedWorldWorker::hands_over() const {
+// Whether this worker has to wait here until bodies that it sold have changed owners.
+bool SharedWorldWorker::is_at_handover() const {
     return market_.awaits_registration() || (market_.is_sold() && exchange_.steps_done() >= handover_step_);
 }
 
@@ -148,11 +127,11 @@ std::string SharedWorldWorker::waits_for() const {
     if (left_ || ended_) return "nobody any more";
     if (exchange_.own_bodies() == 0) return "bodies";
     if (market_.awaits_answer()) return "an answer to its offer";
-    if (hands_over()) return "the others, to hand bodies over";
+    if (is_at_handover()) return "the others, to hand bodies over";
     if (sellers_.empty()) return std::to_string(exchange_.lead()).append(" steps for the slowest");
-    std::string who = "bodies from";
-    for (const auto& [seller, step] : sellers_) who.append(" ").append(std::to_string(seller));
-    return who;
+    std::string what = "bodies from";
+    for (const auto& [seller, step] : sellers_) what.append(" ").append(std::to_string(seller));
+    return what;
 }
 
 void SharedWorldWorker::step() {
@@ -168,13 +147,13 @@ double SharedWorldWorker::work() const {
     return sum;
 }
 
-void SharedWorldWorker::worked(const Times& times) {
-    exchange_.weigh();
-    market_.worked(exchange_.steps_done(), times.seconds, work(), exchange_.own_bodies());
+void SharedWorldWorker::end_step(const Times& times) {
+    exchange_.update_costs();
+    market_.end_step(exchange_.steps_done(), times.seconds, work(), exchange_.own_bodies());
     publish(times);
-    if (exchange_.owes()) publish({});
+    if (exchange_.must_publish()) publish({});
     trade();
-    exchange_.follow();
+    exchange_.advance_without_bodies();
 }
 
 void SharedWorldWorker::publish(const Times& times) {
@@ -193,8 +172,8 @@ void SharedWorldWorker::publish(const Times& times) {
     exchange_.publish(epoch_, report);
 }
 
-// Between steps, after states are on their way: one offer a step, and another when bodies are handed over. Who leaves offers whatever
-// it was asked for.
+// Trades between steps, once the step's messages are on their way: one offer a step, and another one after a
+// handover. A worker that leaves makes offers at any time.
 void SharedWorldWorker::trade() {
     const bool sold = hand_over();
     if (may_leave()) return leave();
@@ -204,27 +183,27 @@ void SharedWorldWorker::trade() {
     if (const std::optional<Offer> offer = make_offer()) send(*offer);
 }
 
-// What was asked for comes before what is dear.
+// Requests of the application come before load balancing.
 std::optional<Offer> SharedWorldWorker::make_offer() {
-    while (!gathers_.empty() && !market_.is_selling()) {
-        Asked asked = std::move(gathers_.front());
-        gathers_.pop_front();
-        if (exchange_.steps_done() > asked.step + forgets_after_) continue;
+    while (!requests_.empty() && !market_.is_selling()) {
+        Request request = std::move(requests_.front());
+        requests_.pop_front();
+        if (exchange_.steps_done() > request.step + requests_hold_) continue;
         const SharedWorld& world = exchange_.world();
-        std::erase_if(asked.what.bodies, [&world](std::uint32_t body) {
+        std::erase_if(request.what.bodies, [&world](std::uint32_t body) {
             return body >= static_cast<std::uint32_t>(world.bodies()) || !world.own(static_cast<int>(body));
         });
-        if (const std::optional<Offer> offer = market_.make_offer(asked.what)) return offer;
+        if (const std::optional<Offer> offer = market_.make_offer(request.what)) return offer;
     }
     if (draining_ || !market_.wants_to_sell()) return std::nullopt;
     return market_.make_offer(exchange_.holdings());
 }
 
 bool SharedWorldWorker::hand_over() {
-    if (exchange_.steps_done() < handover_step_ || !exchange_.may_give()) return false;
+    if (exchange_.steps_done() < handover_step_ || !exchange_.may_hand_over()) return false;
     const std::optional<Offer> sold = market_.hand_over();
     if (!sold) return false;
-    Handover handover = exchange_.give(sold->bodies);
+    Handover handover = exchange_.hand_over(sold->bodies);
     handover.to = sold->to, handover.number = sold->number;
     send(handover);
     return true;
@@ -234,7 +213,7 @@ void SharedWorldWorker::drain() {
     if (!left_ && !std::exchange(draining_, true)) send(Leaves{});
 }
 
-// All is sold, or there is nobody to sell to.
+// Whether all bodies are sold, or no member is left to sell them to.
 bool SharedWorldWorker::may_leave() const {
     if (!draining_ || gives_up_) return gives_up_;
     return exchange_.has_nothing() && sellers_.empty() && !market_.is_selling() &&
@@ -246,14 +225,14 @@ void SharedWorldWorker::stop_waiting_for_answer() {
     trade();
 }
 
-// Bodies handed over without a buyer are distributed by the application.
+// Bodies that are handed over without a buyer are distributed by the application.
 void SharedWorldWorker::leave() {
     std::vector<std::uint32_t> bodies;
     const SharedWorld& world = exchange_.world();
     for (int i = 0; i < world.bodies(); ++i)
         if (world.own(i) && world.definition(i).moves()) bodies.push_back(static_cast<std::uint32_t>(i));
     if (!bodies.empty()) {
-        Handover handover = exchange_.give(bodies);
+        Handover handover = exchange_.hand_over(bodies);
         handover.to = kApplication;
         send(handover);
     }

@@ -14,19 +14,18 @@ namespace {
 
 constexpr double kSlowShare = 0.25;        // of sqrt(g size)
 constexpr double kBeside = 0.02;           // of the size
-constexpr std::size_t kOwnPerForeign = 4;  // bodies of a structure for each other that touches it
-
-constexpr double kMayMeet = 0.1;        // of the size: who lands turns, and goes a little aside
-constexpr double kFlatExponent = 0.5;   // up to this one a side has a flat middle
-constexpr double kUpright = 0.966;      // cosine of 15 degrees
-constexpr double kUprightShare = 0.75;  // of a structure's bodies, of those that may be more
+constexpr std::size_t kOwnPerForeign = 4;  // own bodies of a structure for each of others that touches it
+constexpr double kMayMeet = 0.1;           // of the size: a body that lands turns and moves aside a little
+constexpr double kFlatExponent = 0.5;      // with an exponent up to this one a side has a flat middle
+constexpr double kUpright = 0.966;         // cosine of 15 degrees
+constexpr double kUprightShare = 0.75;     // of the bodies of a structure with kMostStanding
 constexpr int kMostAhead = 8, kOutlookSteps = 8, kLooks = 8;
 
 struct Candidate {
     int body;
     bool own, slow, upright;
     Eigen::AlignedBox3d box;
-    Eigen::AlignedBox3d path = {};  // boxes of all times that are looked at
+    Eigen::AlignedBox3d path = {};  // contains the boxes of all times
     Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
 };
 
@@ -48,7 +47,8 @@ bool is_upright(const WorldBody& body, const Eigen::Quaterniond& orientation, co
     return (around ? own_up.maxCoeff() : own_up.y()) >= kUpright;
 }
 
-/// Whether a body's centre is in another's box: they come one after the other, and fall from there.
+/// Whether a body's centre is in another's box: such bodies are added one after the other, each when the last
+/// has fallen.
 bool come_to_one_place(const SharedWorld& all, const std::vector<int>& bodies) {
     std::vector<Eigen::AlignedBox3d> boxes;
     for (const int body : bodies) boxes.push_back(box_around(all, body, all.state(body)));
@@ -62,7 +62,7 @@ double slow_speed(const SharedWorld& world, double size) {
     return kSlowShare * std::sqrt(world.settings().gravity.norm() * size);
 }
 
-/// Joins what belongs together. Paths that are further apart along x than `near` are not asked for.
+/// Joins bodies that belong together. Bodies whose paths are further apart along x than `near` do not.
 template <typename Together>
 DisjointSets join(const SharedWorld& world, std::vector<Candidate>& candidates, double near,
                   const Together& together) {
@@ -96,7 +96,7 @@ std::map<int, Found> by_first(DisjointSets& sets, const std::vector<Candidate>& 
     return found;
 }
 
-/// Whether two come near each other: across gravity at the same time, along it whenever, as who falls first may be stopped.
+/// Whether two bodies come near each other: across gravity at the same time, along gravity at any times.
 bool come_near(const Candidate& a, const Candidate& b, const Eigen::Vector3d& up, double within_s,
                double size) {
     const auto along = [&](const Eigen::AlignedBox3d& box) {
@@ -147,7 +147,7 @@ std::vector<std::vector<int>> structures(const SharedWorld& world, std::span<con
     DisjointSets sets = join(world, slow, beside, [beside](const Candidate& a, const Candidate& b) {
         return a.box.squaredExteriorDistance(b.box) <= beside * beside;
     });
-    std::map<int, std::set<int>> touching;  // bodies of others, each
+    std::map<int, std::set<int>> touching;  // others' bodies that touch each set
     for (const CrossImpulse& c : world.cross_impulses()) touching[sets.first(c.own)].insert(c.ghost);
     std::vector<std::vector<int>> result;
     for (auto& [first, of] : by_first(sets, slow))
@@ -190,7 +190,8 @@ SharedWorld with_later(const WorldScene& scene) {
     return world;
 }
 
-PlannedStructures::PlannedStructures(const WorldScene& scene, double size, double within_s) {
+StructureFinder::StructureFinder(const WorldScene& scene, double size, double within_s)
+    : size_(size), within_s_(within_s) {
     if (scene.later.empty()) return;
     const SharedWorld all = with_later(scene);
     std::vector<int> moving;
@@ -203,12 +204,22 @@ PlannedStructures::PlannedStructures(const WorldScene& scene, double size, doubl
     });
 }
 
-void PlannedStructures::add_unfinished(int bodies, std::vector<std::vector<int>>& structures) const {
-    for (const std::vector<int>& planned : planned_)
-        if (planned.back() >= bodies) structures.push_back(planned);
+std::vector<std::vector<int>> StructureFinder::flat(const SharedWorld& world, std::span<const int> bodies,
+                                                    std::span<const OthersBody> others) const {
+    std::vector<std::vector<int>> found = flat_structures(world, bodies, size_, within_s_, others);
+    std::ranges::copy_if(planned_, std::back_inserter(found),
+                         [&](const std::vector<int>& planned) { return planned.back() >= world.bodies(); });
+    return found;
 }
 
-bool are_alike(const SharedWorld& world, const std::vector<std::vector<int>>& lots,
+std::vector<std::vector<int>> StructureFinder::all(const SharedWorld& world, std::span<const int> bodies,
+                                                   std::span<const OthersBody> others) const {
+    std::vector<std::vector<int>> found = flat(world, bodies, others);
+    std::ranges::move(structures(world, bodies, size_), std::back_inserter(found));
+    return found;
+}
+
+bool are_alike(const SharedWorld& world, const std::vector<std::vector<int>>& groups,
                const std::vector<std::vector<int>>& structures) {
     struct Range {
         double least = std::numeric_limits<double>::infinity(), most = 0;
@@ -220,30 +231,30 @@ bool are_alike(const SharedWorld& world, const std::vector<std::vector<int>>& lo
     std::set<int> in_structure;
     for (const std::vector<int>& bodies : structures) in_structure.insert(bodies.begin(), bodies.end());
     Range mass, length, free_mass, free_length;
-    for (const std::vector<int>& lot : lots) {
+    for (const std::vector<int>& group : groups) {
         Range masses, lengths;
-        for (const int body : lot) {
+        for (const int body : group) {
             masses.add(world.rigid_mass(body).mass);
             lengths.add(world.definition(body).shape.base.semi_axes.maxCoeff());
         }
         mass.add(masses.most), length.add(lengths.most);
-        if (std::ranges::any_of(lot, [&](int body) { return in_structure.contains(body); })) continue;
+        if (std::ranges::any_of(group, [&](int body) { return in_structure.contains(body); })) continue;
         free_mass.add(masses.most), free_length.add(lengths.most);
     }
     return free_mass.within(kMostUnlikeMass, mass) && free_length.within(kMostUnlikeLength, length);
 }
 
 std::vector<int> joined_by(const std::vector<std::vector<int>>& structures,
-                           const std::vector<std::vector<int>>& lots) {
-    DisjointSets sets(lots.size());
-    std::map<int, int> lot_of;
+                           const std::vector<std::vector<int>>& groups) {
+    DisjointSets sets(groups.size());
+    std::map<int, int> group_of;
     if (!structures.empty())
-        for (std::size_t i = 0; i < lots.size(); ++i)
-            for (const int body : lots[i]) lot_of[body] = static_cast<int>(i);
+        for (std::size_t i = 0; i < groups.size(); ++i)
+            for (const int body : groups[i]) group_of[body] = static_cast<int>(i);
     for (const std::vector<int>& bodies : structures)
-        for (const int body : bodies) sets.join(lot_of.at(bodies.front()), lot_of.at(body));
+        for (const int body : bodies) sets.join(group_of.at(bodies.front()), group_of.at(body));
     std::vector<int> first;
-    for (std::size_t i = 0; i < lots.size(); ++i) first.push_back(sets.first(static_cast<int>(i)));
+    for (std::size_t i = 0; i < groups.size(); ++i) first.push_back(sets.first(static_cast<int>(i)));
     return first;
 }
 

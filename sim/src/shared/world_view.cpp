@@ -16,7 +16,7 @@ void assign(WorldRecord& record, const Update& update) {
     record.at_limit = false, record.still_steps = 0, record.sleep_group = -1;
 }
 
-void WorldView::take(std::uint64_t step, const std::vector<Update>& updates) {
+void WorldView::add(std::uint64_t step, const std::vector<Update>& updates) {
     for (const Update& update : updates)
         if (Published* place = place_for(static_cast<int>(update.body), step)) {
             assign(place->record, update);
@@ -24,7 +24,7 @@ void WorldView::take(std::uint64_t step, const std::vector<Update>& updates) {
         }
 }
 
-void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records, bool last) {
+void WorldView::add(std::uint64_t step, const std::vector<WorldRecord>& records, bool last) {
     for (const WorldRecord& record : records)
         if (Published* place = place_for(record.body, step, last)) {
             place->record = record;
@@ -32,7 +32,7 @@ void WorldView::take(std::uint64_t step, const std::vector<WorldRecord>& records
         }
 }
 
-// nullptr: it is there, or will not be shown.
+// nullptr: the body has a state of this step, or the step is shown already.
 WorldView::Published* WorldView::place_for(int body, std::uint64_t step, bool again) {
     auto& all = published_[static_cast<std::size_t>(body)];
     if (step <= step_ || !clock_.there_at(body, step)) return nullptr;

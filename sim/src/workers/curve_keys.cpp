@@ -102,7 +102,7 @@ void write_keys(const fs::path& folder, const std::vector<std::string>& names) {
               "public " + application.shown + "\nsecret " + application.secret + "\n", 0600);
 }
 
-/// ADDRESS of tcp://ADDRESS:PORT; empty if it is none.
+/// ADDRESS of tcp://ADDRESS:PORT; empty for another endpoint.
 std::string address_of(const std::string& endpoint) {
     const std::string rest = endpoint.substr(std::min<std::size_t>(6, endpoint.size()));
     const std::size_t colon = rest.rfind(':');

@@ -5,7 +5,7 @@
 
 namespace sim {
 
-// CURVE keys, as ZeroMQ takes them: Z85, 40 characters. Files hold lines of a word and a key:
+// CURVE keys in ZeroMQ's form: Z85, 40 characters. Each line of a file is a word and a key:
 //   application.key  public, secret            0600
 //   application.pub  the public key alone
 //   NAME.key         public, secret, application (the application's public key)    0600
@@ -25,12 +25,13 @@ struct WorkerKeys {
     std::string application;
 };
 
-/// Throw std::invalid_argument: what was found, what was expected. A secret that others may read is refused.
+/// Both throw std::invalid_argument, which says what was found and what was expected. A secret that others
+/// may read is refused.
 [[nodiscard]] ApplicationKeys read_application_keys(const std::filesystem::path& folder);
 [[nodiscard]] WorkerKeys read_worker_keys(const std::filesystem::path& file);
 
-/// Throws std::invalid_argument unless it is ipc://PATH or tcp://ADDRESS:PORT, and where it leaves this
-/// machine only with keys. `*` is every address.
+/// Throws std::invalid_argument unless the endpoint is ipc://PATH or tcp://ADDRESS:PORT. Without keys the
+/// address must be of this machine alone. `*` is every address.
 void check_endpoint(const std::string& endpoint, bool keys);
 
 }  // namespace sim

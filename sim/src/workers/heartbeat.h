@@ -16,19 +16,19 @@ namespace sim {
 [[nodiscard]] zmq::socket_t connect_worker(zmq::context_t& context, const std::string& endpoint,
                                            const std::optional<WorkerKeys>& keys, int linger_ms);
 
-/// Sends a worker's heartbeats from a thread of its own, so that a long step is not taken for a failure, and
-/// detects the application's end. On the same machine (ipc) that is the end of its process; otherwise, once
-/// a member, 1.5 s without an answer to a heartbeat.
-class Pulse {
+/// Sends a worker's heartbeats from a thread of its own, so that a long step does not look like a failure. It
+/// also detects the application's end: on the same machine (ipc) the end of its process; otherwise 1.5 s
+/// without an answer to a heartbeat, once the worker is a member.
+class Heartbeat {
 public:
-    /// `secret`: by which the application knows the beats to be this worker's.
-    Pulse(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys,
-          const Secret& secret);
+    /// `secret`: proves to the application that the heartbeats are this worker's.
+    Heartbeat(zmq::context_t& context, const std::string& endpoint, const std::optional<WorkerKeys>& keys,
+              const Secret& secret);
 
-    /// From now on sends heartbeats of this member. If this process has not ended 0.4 s after the application's
-    /// end, it is ended.
+    /// From now on the heartbeats are those of this member. If this process still runs 0.4 s after the
+    /// application's end, it is ended.
     void joined(std::uint32_t worker) noexcept { worker_ = worker; }
-    [[nodiscard]] bool application_gone() const noexcept { return gone_; }  ///< set once
+    [[nodiscard]] bool application_gone() const noexcept { return gone_; }  ///< once true, it stays true
 
 private:
     void beat(zmq::context_t& context, const std::optional<WorkerKeys>& keys, const std::stop_token& stop);
@@ -42,7 +42,8 @@ private:
     const bool child_;         ///< of the application
     std::atomic<std::int64_t> worker_ = kNoMember;
     std::atomic<bool> gone_ = false;
-    std::jthread thread_;  // last: starts when the rest is there, joins before it goes
+    // Last member: it starts after the others exist and joins before they are destroyed.
+    std::jthread thread_;
 };
 
 }  // namespace sim

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 
-#include "workers/signal_mask.h"
+#include "workers/signals.h"
 
 namespace sim {
 namespace {
 
-// Two of the envelope; version, id, domain, address, identity, mechanism, key.
+// Two frames of the envelope, then version, id, domain, address, identity, mechanism, key.
 constexpr std::size_t kRequestFrames = 9, kIdAt = 3, kMechanismAt = 7, kKeyAt = 8;
 constexpr int kKeyLookMs = 50;
 
@@ -43,23 +43,23 @@ void KeyGate::serve(const std::stop_token& stop) {
             while (request.back().more()) (void)socket_.recv(request.emplace_back());
             answer(request);
         } catch (const zmq::error_t& e) {
-            if (e.num() != EINTR) return;  // the context is going
+            if (e.num() != EINTR) return;  // the context ends
         }
     }
 }
 
-bool KeyGate::knows(const Frames& request) const {
+bool KeyGate::is_allowed(const Frames& request) const {
     if (request.size() != kRequestFrames || request[kMechanismAt].to_string_view() != "CURVE") return false;
     return std::ranges::find(allowed_, request[kKeyAt].to_string_view()) != allowed_.end();
 }
 
 void KeyGate::answer(const Frames& request) {
-    const bool known = knows(request);
-    refused_ += !known;
+    const bool allowed = is_allowed(request);
+    refused_ += !allowed;
     if (request.size() <= kIdAt) return;
     const std::array<std::string, 8> reply = {
-        request[0].to_string(),       "", "1.0", request[kIdAt].to_string(), known ? "200" : "400",
-        known ? "OK" : "no such key", "", ""};
+        request[0].to_string(),         "", "1.0", request[kIdAt].to_string(), allowed ? "200" : "400",
+        allowed ? "OK" : "no such key", "", ""};
     for (std::size_t i = 0; i < reply.size(); ++i)
         socket_.send(zmq::buffer(reply[i]),
                      i + 1 < reply.size() ? zmq::send_flags::sndmore : zmq::send_flags::none);

@@ -9,7 +9,7 @@
 namespace sim {
 
 /// Admits only peers with a listed key in CURVE's handshake (ZeroMQ's ZAP, RFC 27), on a thread of its own.
-/// One per context, made before its sockets are bound; sockets need `kDomain`.
+/// A context has one, constructed before its sockets are bound. The sockets need `kDomain`.
 class KeyGate {
 public:
     static constexpr const char* kDomain = "musicworld";
@@ -24,13 +24,13 @@ public:
 private:
     using Frames = std::vector<zmq::message_t>;
     void serve(const std::stop_token& stop);
-    [[nodiscard]] bool knows(const Frames& request) const;
+    [[nodiscard]] bool is_allowed(const Frames& request) const;
     void answer(const Frames& request);
 
     std::vector<std::string> allowed_;  ///< as bytes
     zmq::socket_t socket_;
     std::atomic<std::uint64_t> refused_ = 0;
-    std::jthread thread_;  // last: starts when the rest is there
+    std::jthread thread_;  // last member: it starts after the others exist
 };
 
 }  // namespace sim

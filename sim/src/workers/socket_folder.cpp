@@ -16,7 +16,7 @@ constexpr const char* kPrefix = "/musicworld-";
 constexpr const char* kSocket = "/workers";
 constexpr std::size_t kLongestPath = 99;  // a Unix socket's path has 107 characters at most
 
-/// Of `endpoint`, if SocketFolder made it; else empty.
+/// The folder of `endpoint`, if SocketFolder made it; else empty.
 std::string folder_of(const std::string& endpoint) {
     const std::string scheme = "ipc://";
     if (!endpoint.starts_with(scheme) || !endpoint.ends_with(kSocket)) return {};
@@ -25,7 +25,7 @@ std::string folder_of(const std::string& endpoint) {
     return folder.rfind('/') == folder.rfind(kPrefix) ? folder : std::string();
 }
 
-/// With its socket, and nothing else.
+/// Removes the socket and the folder, and nothing else.
 void remove_folder(const std::string& folder) noexcept {
     unlink((folder + kSocket).c_str());
     rmdir(folder.c_str());

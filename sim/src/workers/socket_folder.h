@@ -4,8 +4,8 @@
 
 namespace sim {
 
-/// A private folder (0700, musicworld-PROCESS-XXXXXX under TMPDIR or /tmp) for the workers' ipc socket;
-/// removed with it at the end.
+/// A private folder (0700, musicworld-PROCESS-XXXXXX under TMPDIR or /tmp) for the workers' ipc socket. The
+/// destructor removes both.
 class SocketFolder {
 public:
     SocketFolder();  ///< throws std::runtime_error
@@ -24,7 +24,7 @@ private:
 /// it.
 [[nodiscard]] std::uint32_t application_of(const std::string& endpoint) noexcept;
 
-/// Removes what an application that ended abnormally left at `endpoint`: the socket and its folder, if
+/// Removes the socket and its folder that an application left at `endpoint` when it ended abnormally, if
 /// SocketFolder made them.
 void remove_left_socket(const std::string& endpoint) noexcept;
 

@@ -14,7 +14,8 @@ namespace {
 using namespace std::chrono_literals;
 constexpr auto kStruckPoll = 20ms;
 constexpr auto kStruckAnswerWithin = 30s;
-constexpr auto kStruckPaused = 250ms;  // a longer gap between two looks is ours, not the workers' delay
+// After a longer gap between two checks this process was paused, and the workers were not late.
+constexpr auto kStruckPaused = 250ms;
 constexpr auto kStopWithin = 1s;
 constexpr int kStruckMostWorkers = 256;
 constexpr std::int64_t kStruckLargestMessage = 64 << 20;
@@ -58,7 +59,7 @@ void StruckWorkers::wait_for_joins() {
         for (Slot& slot : slots_) {
             if (missing(slot) && slot.process.has_ended()) {
                 if (slot.process.was_killed()) {
-                    lose(slot);  // as later: the others take its share
+                    lose(slot);  // the others get its share
                     continue;
                 }
                 throw WorkerError("a worker ended before it joined: " + slot.process.ending());
@@ -73,8 +74,8 @@ void StruckWorkers::share_out() {
     std::vector<std::uint32_t> all(definitions_.size());
     for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<std::uint32_t>(i);
     orphans_ = all;
-    settle_losses();
-    report_.bodies_reowned = 0;  // the first owners
+    reassign_orphans();
+    report_.bodies_reowned = 0;  // these are the first owners
 }
 
 StruckWorkers::~StruckWorkers() {
@@ -92,8 +93,8 @@ StepReply StruckWorkers::step(const StepRequest& request) {
         throw InputError("request.t_s is before the last step's");
     receive(0ms);
     request_ = nullptr;
-    look_after_workers();
-    settle_losses();
+    check_workers();
+    reassign_orphans();
     request_ = &request;
     last_t_s_ = request.t_s;
     ++step_;
@@ -103,11 +104,11 @@ StepReply StruckWorkers::step(const StepRequest& request) {
     for (std::uint32_t b = 0; b < here_.size(); ++b) {
         if (here_[b]) step_here(b);
     }
-    settle_losses();
+    reassign_orphans();
     while (waiting()) {
         receive(kStruckPoll);
-        look_after_workers();
-        settle_losses();
+        check_workers();
+        reassign_orphans();
     }
     request_ = nullptr;
     return merge(outcomes_, request);
@@ -153,10 +154,10 @@ void StruckWorkers::send(const Slot& slot, const WorkerMessage& message) {
 }
 
 void StruckWorkers::receive(std::chrono::milliseconds timeout) {
-    for (const WorkerGate::Event& event : gate_.wait(timeout)) take(event);
+    for (const WorkerGate::Event& event : gate_.wait(timeout)) handle(event);
 }
 
-void StruckWorkers::take(const WorkerGate::Event& event) {
+void StruckWorkers::handle(const WorkerGate::Event& event) {
     if (event.kind == WorkerGate::Event::Kind::asks_to_join) return join(event);
     Slot& slot = slots_[event.worker];
     if (!slot.alive) return;
@@ -180,7 +181,7 @@ void StruckWorkers::join(const WorkerGate::Event& event) {
     send(*slot, StruckAssign{});
 }
 
-bool StruckWorkers::fits(const Pending& pending, const StruckAnswer& answer) const {
+bool StruckWorkers::answers(const Pending& pending, const StruckAnswer& answer) const {
     if (pending.epoch != answer.epoch || answer.step != step_ ||
         pending.bodies.size() != answer.outcomes.size())
         return false;
@@ -196,7 +197,7 @@ bool StruckWorkers::fits(const Pending& pending, const StruckAnswer& answer) con
 
 void StruckWorkers::accept(Slot& slot, StruckAnswer& answer) {
     const auto pending = std::find_if(slot.pending.begin(), slot.pending.end(),
-                                      [&](const Pending& p) { return request_ && fits(p, answer); });
+                                      [&](const Pending& p) { return request_ && answers(p, answer); });
     if (pending == slot.pending.end()) return lose(slot);
     for (BodyOutcome& outcome : answer.outcomes) {
         const std::uint32_t b = outcome.body;
@@ -207,9 +208,9 @@ void StruckWorkers::accept(Slot& slot, StruckAnswer& answer) {
     slot.pending.erase(pending);
 }
 
-void StruckWorkers::look_after_workers() {
+void StruckWorkers::check_workers() {
     const Clock::time_point now = Clock::now();
-    const bool paused = now - std::exchange(looked_, now) > kStruckPaused;
+    const bool paused = now - std::exchange(checked_, now) > kStruckPaused;
     for (Slot& slot : slots_) {
         if (!slot.alive) continue;
         for (Pending& pending : slot.pending)
@@ -232,14 +233,14 @@ void StruckWorkers::lose(Slot& slot) {
     slot.pending.clear();
 }
 
-void StruckWorkers::settle_losses() {
+void StruckWorkers::reassign_orphans() {
     while (!orphans_.empty()) {
         std::vector<std::uint32_t> bodies = std::exchange(orphans_, {});
         std::vector<Slot*> living;
         for (Slot& slot : slots_) {
             if (slot.alive) living.push_back(&slot);
         }
-        if (living.empty()) return own_here(bodies);
+        if (living.empty()) return take_over(bodies);
         std::vector<std::vector<std::uint32_t>> shares(living.size());
         for (const std::uint32_t body : bodies) shares[next_slot_++ % shares.size()].push_back(body);
         for (std::size_t i = 0; i < living.size(); ++i)
@@ -247,7 +248,7 @@ void StruckWorkers::settle_losses() {
     }
 }
 
-void StruckWorkers::own_here(const std::vector<std::uint32_t>& bodies) {
+void StruckWorkers::take_over(const std::vector<std::uint32_t>& bodies) {
     for (const std::uint32_t body : bodies) {
         here_[body] = std::make_unique<SteppedBody>(body, definitions_[body], records_[body]);
         if (request_ && answered_[body] < step_) step_here(body);

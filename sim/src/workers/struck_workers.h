@@ -8,16 +8,16 @@
 
 namespace sim {
 
-/// Bodies shared out to worker processes, which join through a WorkerGate; what they say is taken within step(), construction and
-/// destruction.
+/// Bodies shared out to worker processes, which join through a WorkerGate. Their messages are handled in the
+/// constructor, step() and the destructor.
 ///
-/// The application holds every body's definition and its record after the last answer. A worker that exits,
-/// does not join in time, is silent for 1 s, breaks the protocol or does not answer within 30 s is
-/// killed; its bodies are assigned, from those records, to the other workers in turn (to this process when
-/// none is left), and the step is asked for again for those of them that had not been answered. Records are
-/// exact, each body's step depends on nothing else, and merge() orders by body: the reply has the same bits
-/// in every case. Every assignment has a new epoch; an answer counts only if its worker lives and was asked
-/// for that step under that epoch. Wall time decides only who computes, never what.
+/// The application holds every body's definition and its record after the last answer. A worker is killed if
+/// it exits, does not join in time, is silent for 1 s, breaks the protocol or does not answer within 30 s.
+/// Its bodies are assigned, from these records, to the other workers in turn, or to this process when none is
+/// left. The step is requested again for those of its bodies that were not answered. Records are exact, each
+/// body's step depends on nothing else, and merge() orders by body. So the reply has the same bits in every
+/// case. Every assignment has a new epoch. An answer counts only if its worker lives and got a request for
+/// that step under that epoch. Wall time decides only which process computes.
 class StruckWorkers final : public Simulation {
 public:
     StruckWorkers(std::vector<BodyDefinition> bodies, const WorkerLaunch& launch);
@@ -47,14 +47,14 @@ private:
     [[nodiscard]] StepRequest request_for(const std::vector<std::uint32_t>& bodies) const;
     void send(const Slot& slot, const WorkerMessage& message);
     void receive(std::chrono::milliseconds timeout);
-    void take(const WorkerGate::Event& event);
+    void handle(const WorkerGate::Event& event);
     void join(const WorkerGate::Event& event);
     void accept(Slot& slot, StruckAnswer& answer);
-    [[nodiscard]] bool fits(const Pending& pending, const StruckAnswer& answer) const;
-    void look_after_workers();
+    [[nodiscard]] bool answers(const Pending& pending, const StruckAnswer& answer) const;
+    void check_workers();
     void lose(Slot& slot);
-    void settle_losses();
-    void own_here(const std::vector<std::uint32_t>& bodies);
+    void reassign_orphans();
+    void take_over(const std::vector<std::uint32_t>& bodies);
     void step_here(std::uint32_t body);
     [[nodiscard]] bool waiting() const;
 
@@ -70,10 +70,10 @@ private:
     double last_t_s_ = 0;
     std::uint32_t epoch_ = 0;
     std::size_t next_slot_ = 0;
-    Clock::time_point looked_;
+    Clock::time_point checked_;
     WorkerReport report_;
     WorkerGate gate_;
-    std::vector<Slot> slots_;  ///< by members' numbers; last: processes end before the gate goes
+    std::vector<Slot> slots_;  ///< by members' numbers; last member: the processes end before the gate
 };
 
 }  // namespace sim

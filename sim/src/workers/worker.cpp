@@ -14,7 +14,7 @@
 #include "sim/errors.h"
 #include "struck/stepped_body.h"
 #include "workers/heartbeat.h"
-#include "workers/leave_signals.h"
+#include "workers/signals.h"
 #include "workers/socket_folder.h"
 #include "workers/worker_process.h"
 #include "workers/world_service.h"
@@ -34,7 +34,7 @@ std::span<const std::uint8_t> bytes_of(const zmq::message_t& frame) {
     return {frame.data<std::uint8_t>(), frame.size()};
 }
 
-/// False after a while without a message.
+/// Returns false if no message comes for a while.
 bool receive(zmq::socket_t& socket, zmq::message_t& frame) {
     try {
         return socket.recv(frame).has_value();
@@ -44,22 +44,23 @@ bool receive(zmq::socket_t& socket, zmq::message_t& frame) {
     }
 }
 
-/// Serves a play's StruckWorkers.
+/// A worker of a play, see StruckWorkers.
 class KitWorker {
 public:
-    KitWorker(zmq::socket_t& socket, const Pulse& pulse) : socket_(socket), pulse_(pulse) {}
+    KitWorker(zmq::socket_t& socket, const Heartbeat& heartbeat) : socket_(socket), heartbeat_(heartbeat) {}
 
-    /// `first`: the answer to the request to join. 0 when told to stop, 1 when the application is gone.
+    /// `first`: the answer to the request to join. Returns 0 at the end of the play, 1 when the application
+    /// is gone.
     int serve(DecodedMessage&& first) {
         WorkerMessage message = std::move(first.message);
         zmq::message_t frame;
         do {
             if (std::holds_alternative<EndOfRun>(message)) return 0;
             std::visit([this](const auto& m) { handle(m); }, message);
-            while (!pulse_.application_gone() && !receive(socket_, frame)) {
+            while (!heartbeat_.application_gone() && !receive(socket_, frame)) {
             }
-            if (!pulse_.application_gone()) message = decode_message(bytes_of(frame)).message;
-        } while (!pulse_.application_gone());
+            if (!heartbeat_.application_gone()) message = decode_message(bytes_of(frame)).message;
+        } while (!heartbeat_.application_gone());
         return 1;
     }
 
@@ -85,23 +86,24 @@ private:
     }
 
     zmq::socket_t& socket_;
-    const Pulse& pulse_;
+    const Heartbeat& heartbeat_;
     std::map<std::uint32_t, SteppedBody> bodies_;
 };
 
-/// Until the application has answered. Who is told to leave waits only for an answer that may be under way.
-bool wait_for_answer(zmq::socket_t& socket, const Pulse& pulse, zmq::message_t& frame) {
+/// Waits for the application's answer to the request to join. Once the worker is asked to leave it waits only
+/// for an answer that may be under way.
+bool wait_for_answer(zmq::socket_t& socket, const Heartbeat& heartbeat, zmq::message_t& frame) {
     auto until = std::chrono::steady_clock::now() + kAnswerWithin;
-    bool leaves = false;
-    while (!pulse.application_gone() && std::chrono::steady_clock::now() < until) {
+    bool leaving = false;
+    while (!heartbeat.application_gone() && std::chrono::steady_clock::now() < until) {
         if (receive(socket, frame)) return true;
-        if (leave_asked() && !std::exchange(leaves, true))
+        if (leave_asked() && !std::exchange(leaving, true))
             until = std::min(until, std::chrono::steady_clock::now() + kLeaveWithin);
     }
     return false;
 }
 
-/// From who started it, or made here.
+/// From the process that started this one, or a new one.
 Secret own_secret() {
     const char* given = std::getenv(kSecretVariable);
     const std::optional<Secret> secret = from_hex(given ? given : "");
@@ -114,21 +116,21 @@ std::vector<std::uint8_t> join_request(const Secret& secret) {
     return encode(MessageHeader{}, JoinRequest{secret, host.data()});
 }
 
-/// By the application's answer: it has a world or a play.
-int serve(zmq::socket_t& socket, Pulse& pulse, int threads, DecodedMessage&& first) {
+/// Serves a world or a play, by the application's first answer.
+int serve(zmq::socket_t& socket, Heartbeat& heartbeat, int threads, DecodedMessage&& first) {
     if (const auto* scene = std::get_if<SceneMessage>(&first.message))
-        return serve_world(socket, pulse, threads, *scene);
+        return serve_world(socket, heartbeat, threads, *scene);
     if (std::holds_alternative<StruckAssign>(first.message)) {
-        pulse.joined(first.header.worker);
+        heartbeat.joined(first.header.worker);
         stop_listening_for_leave();
-        return KitWorker(socket, pulse).serve(std::move(first));
+        return KitWorker(socket, heartbeat).serve(std::move(first));
     }
     if (const auto* refusal = std::get_if<Refusal>(&first.message))
         std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
     return std::holds_alternative<EndOfRun>(first.message) ? 0 : 1;
 }
 
-// ZeroMQ does not say which of both it is.
+// ZeroMQ does not say which of these is the case.
 std::string keys_may_be_wrong(bool with_key) {
     return with_key ? ": nobody listens there, without or with other keys, or it does not allow this one"
                     : ": nobody listens there, or only to workers with keys (--key)";
@@ -139,25 +141,25 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
     zmq::socket_t socket = connect_worker(context, endpoint, keys, kLingerMs);
     socket.set(zmq::sockopt::rcvtimeo, kLookMs);
     const Secret secret = own_secret();
-    Pulse pulse(context, endpoint, keys, secret);
-    listen_for_leave();  // who has asked to join leaves in order
+    Heartbeat heartbeat(context, endpoint, keys, secret);
+    listen_for_leave();  // from the request to join on the worker leaves in order
     send(socket, join_request(secret));
     zmq::message_t frame;
     int status = 1;
-    if (wait_for_answer(socket, pulse, frame)) {
+    if (wait_for_answer(socket, heartbeat, frame)) {
         try {
-            status = serve(socket, pulse, threads, decode_message(bytes_of(frame)));
+            status = serve(socket, heartbeat, threads, decode_message(bytes_of(frame)));
         } catch (const DecodeError& e) {
             send(socket, encode({}, WorkerFailure{e.what()}));
             throw WorkerError(std::string("bad message: ") + e.what());
         }
     } else if (leave_asked()) {
         stop_listening_for_leave();
-    } else if (!pulse.application_gone()) {
+    } else if (!heartbeat.application_gone()) {
         throw WorkerError("no answer from " + endpoint + " within 10 s" +
                           (endpoint.starts_with("tcp") ? keys_may_be_wrong(keys.has_value()) : ""));
     }
-    if (status != 0 && pulse.application_gone()) {
+    if (status != 0 && heartbeat.application_gone()) {
         std::fprintf(stderr, "worker: the application is gone, or has given this worker up\n");
         remove_left_socket(endpoint);
     }
@@ -165,10 +167,6 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
 }
 
 }  // namespace
-
-int run_worker(const std::string& endpoint) {
-    return run_worker(endpoint, {});
-}
 
 int run_worker(const std::string& endpoint, const std::filesystem::path& key, int threads) {
     std::optional<WorkerKeys> keys;

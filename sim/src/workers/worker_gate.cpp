@@ -9,17 +9,18 @@
 #include <utility>
 
 #include "sim/errors.h"
-#include "workers/signal_mask.h"
+#include "workers/signals.h"
 
 namespace sim {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kPoll = 20ms, kPollAtDoor = 5ms;  // in which hundreds of connections may come
+constexpr auto kPoll = 20ms, kPollWhenListening = 5ms;  // hundreds of connections may come meanwhile
 constexpr auto kLastWords = 300ms;
-constexpr auto kBeatUnasked = 100ms;
-constexpr auto kPaused = 250ms;  // a longer gap between two looks is ours, not the workers' silence
-constexpr int kFramesBetweenLooks = 1000;
+constexpr auto kGateBeatEvery = 100ms;
+// After a longer gap between two checks this process was paused, and the workers were not silent.
+constexpr auto kPaused = 250ms;
+constexpr int kFramesBetweenChecks = 1000;
 constexpr std::size_t kMostEventsWaiting = 4096, kMostBytesWaiting = 64 << 20;
 constexpr std::size_t kLargestOfAStranger = 4096;
 constexpr double kMostJoinsAtOnce = 256, kJoinsPerSecond = 4;
@@ -58,7 +59,8 @@ WorkerGate::WorkerGate(const Settings& settings)
     thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
 }
 
-// Options count for what is bound after them: the private folder's socket needs no keys.
+// Options apply to endpoints that are bound after them. The private folder's socket is bound first, as it
+// needs no keys.
 void WorkerGate::bind(const Settings& settings) {
     router_.set(zmq::sockopt::linger, 1000);
     router_.set(zmq::sockopt::sndhwm, settings.most_waiting);
@@ -68,10 +70,10 @@ void WorkerGate::bind(const Settings& settings) {
                 static_cast<int>(std::chrono::milliseconds(kHandshakeWithin).count()));
     router_.set(zmq::sockopt::router_mandatory, true);
     if (settings.in_folder) router_.bind(folder_.emplace().endpoint());
-    if (!settings.listen.empty()) open_door(settings);
+    if (!settings.listen.empty()) listen_at(settings);
 }
 
-void WorkerGate::open_door(const Settings& settings) {
+void WorkerGate::listen_at(const Settings& settings) {
     if (settings.keys) {
         keys_ = std::make_unique<KeyGate>(context_, settings.keys->allowed);
         router_.set(zmq::sockopt::zap_domain, KeyGate::kDomain);
@@ -107,7 +109,7 @@ std::deque<WorkerGate::Event> WorkerGate::wait(std::chrono::milliseconds most) {
     return std::exchange(events_, {});
 }
 
-void WorkerGate::order(Command&& command) {
+void WorkerGate::enqueue(Command&& command) {
     const std::lock_guard lock(mutex_);
     commands_.push_back(std::move(command));
     if (commands_.size() == 1) (void)eventfd_write(wake_, 1);
@@ -118,16 +120,27 @@ void WorkerGate::expect(const Secret& secret) {
     expected_.push_back(secret);
 }
 void WorkerGate::admit(const std::string& stranger, std::uint32_t worker, const Secret& secret) {
-    order({Command::Kind::admit, stranger, {}, {worker}, {}, secret});
+    enqueue([this, stranger, worker, secret] {
+        members_[worker] = {stranger, Clock::now(), false, {}, secret};
+        numbers_[stranger] = worker;
+    });
 }
 void WorkerGate::refuse(const std::string& stranger, const std::string& why) {
-    order({Command::Kind::refuse, stranger, why, {}, {}});
+    enqueue([this, stranger, why] {
+        zmq::message_t frame = framed(Refusal{why});
+        send_to(stranger, frame);
+    });
 }
 void WorkerGate::send(const std::vector<std::uint32_t>& workers, Bytes bytes) {
-    order({Command::Kind::send, {}, {}, workers, std::move(bytes)});
+    enqueue([this, workers, bytes = std::move(bytes)] { send_now(workers, *bytes); });
 }
 void WorkerGate::dismiss(std::uint32_t worker) {
-    order({Command::Kind::dismiss, {}, {}, {worker}, {}});
+    enqueue([this, worker] {
+        const auto found = members_.find(worker);
+        if (found == members_.end()) return;
+        numbers_.erase(found->second.identity);
+        members_.erase(found);
+    });
 }
 
 // The gate's thread.
@@ -136,26 +149,26 @@ void WorkerGate::serve(const std::stop_token& stop) {
     block_signals();
     while (!stop.stop_requested()) {
         poll();
-        obey();
+        execute_commands();
         receive();
-        look_for_silence();
-        beat_unasked();
-        if (listening_) listening_->look();
+        check_silence();
+        send_unrequested_beats();
+        if (listening_) listening_->update();
     }
-    obey();
+    execute_commands();
 }
 
 void WorkerGate::poll() {
     std::array<zmq::pollitem_t, 2> items = {
         {{nullptr, wake_, ZMQ_POLLIN, 0}, {router_.handle(), 0, ZMQ_POLLIN, 0}}};
     try {
-        zmq::poll(items.data(), held_back_ ? 1 : items.size(), listening_ ? kPollAtDoor : kPoll);
+        zmq::poll(items.data(), held_back_ ? 1 : items.size(), listening_ ? kPollWhenListening : kPoll);
     } catch (const zmq::error_t& e) {
         if (e.num() != EINTR) throw;
     }
 }
 
-void WorkerGate::obey() {
+void WorkerGate::execute_commands() {
     std::vector<Command> commands;
     {
         const std::lock_guard lock(mutex_);
@@ -163,31 +176,18 @@ void WorkerGate::obey() {
         eventfd_t count = 0;
         (void)eventfd_read(wake_, &count);
     }
-    for (const Command& command : commands) obey(command);
+    for (const Command& command : commands) command();
 }
 
-void WorkerGate::obey(const Command& command) {
-    if (command.kind == Command::Kind::refuse) {
-        zmq::message_t frame = framed(Refusal{command.why});
-        send_to(command.stranger, frame);
-    } else if (command.kind == Command::Kind::admit) {
-        members_[command.workers[0]] = {command.stranger, Clock::now(), false, {}, command.secret};
-        numbers_[command.stranger] = command.workers[0];
-    } else if (command.kind == Command::Kind::dismiss) {
-        const auto found = members_.find(command.workers[0]);
-        if (found == members_.end()) return;
-        numbers_.erase(found->second.identity);
-        members_.erase(found);
-    } else {
-        const zmq::message_t whole(command.bytes->data(), command.bytes->size());
-        for (const std::uint32_t worker : command.workers) {
-            const auto found = members_.find(worker);
-            if (found == members_.end() || found->second.lost || found->second.broken) continue;
-            zmq::message_t frame;
-            frame.copy(const_cast<zmq::message_t&>(whole));  // shares the bytes
-            // Who has drained and gone may have said so: that is on its way.
-            if (!send_to(found->second.identity, frame)) found->second.broken = Clock::now();
-        }
+void WorkerGate::send_now(const std::vector<std::uint32_t>& workers, const std::vector<std::uint8_t>& bytes) {
+    const zmq::message_t whole(bytes.data(), bytes.size());
+    for (const std::uint32_t worker : workers) {
+        const auto found = members_.find(worker);
+        if (found == members_.end() || found->second.lost || found->second.broken) continue;
+        zmq::message_t frame;
+        frame.copy(const_cast<zmq::message_t&>(whole));  // shares the bytes
+        // The member may have left in order, and its message that says so is on its way.
+        if (!send_to(found->second.identity, frame)) found->second.broken = Clock::now();
     }
 }
 
@@ -202,7 +202,7 @@ bool WorkerGate::send_to(const std::string& identity, zmq::message_t& frame) {
 
 void WorkerGate::receive() {
     zmq::message_t identity, frame;
-    for (int i = 0; i < kFramesBetweenLooks; ++i) {
+    for (int i = 0; i < kFramesBetweenChecks; ++i) {
         {
             const std::lock_guard lock(mutex_);
             held_back_ = full_;
@@ -213,38 +213,38 @@ void WorkerGate::receive() {
         while (!single && frame.more() && router_.recv(frame, zmq::recv_flags::dontwait)) {
         }
         if (single)
-            take(identity.to_string(), frame);
+            handle(identity.to_string(), frame);
         else
             ++refused_messages_;
     }
 }
 
-void WorkerGate::take(std::string&& identity, const zmq::message_t& frame) {
-    if (is(frame, Type::beat)) return take_beat(identity, frame);
+void WorkerGate::handle(std::string&& identity, const zmq::message_t& frame) {
+    if (is(frame, Type::beat)) return handle_beat(identity, frame);
     const auto known = numbers_.find(identity);
-    if (known == numbers_.end()) return take_from_stranger(std::move(identity), frame);
+    if (known == numbers_.end()) return handle_stranger(std::move(identity), frame);
     Member& member = members_.at(known->second);
-    member.heard = Clock::now();
+    member.received_at = Clock::now();
     if (member.lost) return;
     const auto* bytes = frame.data<std::uint8_t>();
     Event event;
     event.worker = known->second;
     event.bytes.assign(bytes, bytes + frame.size());
-    tell(std::move(event));
+    post(std::move(event));
 }
 
-void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& frame) {
+void WorkerGate::handle_beat(const std::string& identity, const zmq::message_t& frame) {
     try {
         const DecodedMessage m = decoded(frame);
         const Secret secret = std::get<Beat>(m.message).secret;
         const auto found = std::find_if(members_.begin(), members_.end(), [&secret](const auto& member) {
             return member.second.secret == secret && secret != Secret{};
         });
-        if (found == members_.end()) {  // who is a member no more learns so when it sends something else
+        if (found == members_.end()) {  // a former member gets a refusal for its next other message
             refused_messages_ += members_.count(m.header.worker);
             return;
         }
-        found->second.heard = Clock::now();
+        found->second.received_at = Clock::now();
         found->second.beats_from = identity;
         zmq::message_t answer = framed(Beat{});
         send_to(identity, answer);
@@ -253,7 +253,7 @@ void WorkerGate::take_beat(const std::string& identity, const zmq::message_t& fr
     }
 }
 
-void WorkerGate::take_from_stranger(std::string&& identity, const zmq::message_t& frame) {
+void WorkerGate::handle_stranger(std::string&& identity, const zmq::message_t& frame) {
     const char* why = "not a member, or given up";
     try {
         if (frame.size() > kLargestOfAStranger) throw DecodeError("a stranger's message that is too long");
@@ -263,7 +263,7 @@ void WorkerGate::take_from_stranger(std::string&& identity, const zmq::message_t
                 Event event;
                 event.kind = Event::Kind::asks_to_join;
                 event.stranger = std::move(identity), event.request = std::move(*request);
-                return tell(std::move(event));
+                return post(std::move(event));
             }
             why = "too many workers ask to join; try again later";
         }
@@ -289,10 +289,10 @@ bool WorkerGate::may_join(const Secret& secret) {
     return true;
 }
 
-/// While nothing is received, so that no worker takes the application for gone.
-void WorkerGate::beat_unasked() {
-    if (!held_back_ || Clock::now() - beaten_ < kBeatUnasked) return;
-    beaten_ = Clock::now();
+/// Sends heartbeats while nothing is received, so that no worker takes the application for gone.
+void WorkerGate::send_unrequested_beats() {
+    if (!held_back_ || Clock::now() - sent_beats_ < kGateBeatEvery) return;
+    sent_beats_ = Clock::now();
     for (auto& [worker, member] : members_) {
         if (member.lost || member.beats_from.empty()) continue;
         zmq::message_t beat = framed(Beat{});
@@ -300,15 +300,15 @@ void WorkerGate::beat_unasked() {
     }
 }
 
-void WorkerGate::look_for_silence() {
+void WorkerGate::check_silence() {
     const Clock::time_point now = Clock::now();
-    const bool paused = now - std::exchange(looked_, now) > kPaused || held_back_;
+    const bool paused = now - std::exchange(checked_, now) > kPaused || held_back_;
     for (auto& [worker, member] : members_) {
-        if (paused) member.heard = now;
+        if (paused) member.received_at = now;
         if (member.lost) continue;
         if (member.broken && now - *member.broken > kLastWords)
             lose(worker, member, "its link broke");
-        else if (now - member.heard > silence_)
+        else if (now - member.received_at > silence_)
             lose(worker, member, "silent for too long");
     }
 }
@@ -317,10 +317,10 @@ void WorkerGate::lose(std::uint32_t worker, Member& member, const std::string& w
     member.lost = true;
     Event event;
     event.kind = Event::Kind::lost, event.worker = worker, event.why = why;
-    tell(std::move(event));
+    post(std::move(event));
 }
 
-void WorkerGate::tell(Event&& event) {
+void WorkerGate::post(Event&& event) {
     const std::lock_guard lock(mutex_);
     waiting_bytes_ += event.bytes.size();
     events_.push_back(std::move(event));

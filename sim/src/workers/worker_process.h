@@ -8,12 +8,14 @@
 
 namespace sim {
 
-/// The environment's variable from which a worker takes its secret; where there is none it makes one.
+/// Name of the environment variable with a worker's secret. Without it the worker makes a secret of its own.
 inline constexpr const char* kSecretVariable = "MUSICWORLD_WORKER_SECRET";
 
-/// One child process. It gets our environment and its secret in it (which other users cannot read), /dev/null as standard input and output, our standard error and
-/// no other descriptor, a process group of its own (a terminal's Ctrl-C is for the application) and default
-/// signal handling. Killed at destruction.
+/// One child process, which the destructor kills. It gets:
+/// - this process's environment with its secret, which other users cannot read;
+/// - /dev/null as standard input and output, this process's standard error, no other descriptor;
+/// - a process group of its own, so that a terminal's Ctrl-C is for the application alone;
+/// - default signal handling.
 class WorkerProcess {
 public:
     /// Throws std::runtime_error.
@@ -25,11 +27,11 @@ public:
 
     [[nodiscard]] std::uint32_t id() const noexcept { return static_cast<std::uint32_t>(id_); }
     [[nodiscard]] const Secret& secret() const noexcept { return secret_; }
-    /// True once the process has ended; reaps it. Never blocks.
+    /// Whether the process has ended. Reaps it; never blocks.
     [[nodiscard]] bool has_ended() noexcept;
-    /// It has ended, by a signal.
+    /// Whether a signal ended it.
     [[nodiscard]] bool was_killed() const noexcept;
-    /// How it ended, in words.
+    /// Its exit status or signal, in words.
     [[nodiscard]] std::string ending() const;
     /// Kills it (also if it is stopped) and waits for its end.
     void kill() noexcept;

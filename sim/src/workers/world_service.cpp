@@ -7,20 +7,19 @@
 #include <thread>
 #include <utility>
 
+#include "run/elapsed_time.h"
 #include "shared/shared_world_worker.h"
 #include "sim/errors.h"
-#include "workers/elapsed.h"
-#include "workers/leave_signals.h"
-#include "world/processor_time.h"
+#include "workers/signals.h"
 
 namespace sim {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kPollMs = 50;
-constexpr double kLongestForAnswer = 0.5;  // that the next step waits for the answer to an offer [s]
+constexpr double kLongestForAnswer = 0.5;  // the next step waits so long for the answer to an offer [s]
 
-/// A ZeroMQ call, again if a signal interrupts it.
+/// Repeats a ZeroMQ call that a signal interrupts.
 template <typename Call>
 auto through_signals(const Call& call) {
     for (;;) {
@@ -32,35 +31,35 @@ auto through_signals(const Call& call) {
     }
 }
 
-/// Sleeps through a signal too.
+/// Signals do not end the sleep.
 void sleep_for(double seconds) {
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
 }
 
 class WorldService {
 public:
-    WorldService(zmq::socket_t& socket, Pulse& pulse, int threads, const SceneMessage& scene)
-        : socket_(socket), pulse_(pulse), threads_(threads), worker_(scene), number_(scene.worker) {
+    WorldService(zmq::socket_t& socket, Heartbeat& heartbeat, int threads, const SceneMessage& scene)
+        : socket_(socket), heartbeat_(heartbeat), threads_(threads), worker_(scene), number_(scene.worker) {
         worker_.use_threads(threads_);
     }
 
     int serve() {
-        while (!worker_.ended() && !pulse_.application_gone()) {
-            take_all();
+        while (!worker_.ended() && !heartbeat_.application_gone()) {
+            receive_all();
             if (leave_asked() && !std::exchange(draining_, true)) worker_.drain();
-            look_after_offer();
+            check_offer();
             if (!worker_.ended() && worker_.ready()) step();
             send_all();
             if (worker_.left()) return 0;
             if (!worker_.ready()) wait();
         }
-        return pulse_.application_gone() || refused_ ? 1 : 0;
+        return heartbeat_.application_gone() || refused_ ? 1 : 0;
     }
-    void report(const std::string& what) { send(encode({number_, 0, 0}, WorkerFailure{what})); }
+    void report_failure(const std::string& what) { send(encode({number_, 0, 0}, WorkerFailure{what})); }
 
 private:
-    /// Who does not answer does not hold up the run.
-    void look_after_offer() {
+    /// A worker that does not answer an offer does not hold up this one.
+    void check_offer() {
         if (!worker_.awaits_answer())
             offered_since_.reset();
         else if (!offered_since_)
@@ -68,7 +67,7 @@ private:
         else if (seconds_since(*offered_since_) > kLongestForAnswer)
             worker_.stop_waiting_for_answer();
     }
-    void take_all() {
+    void receive_all() {
         zmq::message_t frame;
         while (through_signals([&] { return socket_.recv(frame, zmq::recv_flags::dontwait); })) {
             const auto* bytes = frame.data<std::uint8_t>();
@@ -77,7 +76,7 @@ private:
                 std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
                 refused_ = true;
             }
-            worker_.take(m.header, std::move(m.message));
+            worker_.receive(m.header, std::move(m.message));
         }
     }
     void step() {
@@ -87,8 +86,8 @@ private:
         const double worked = seconds_since(start);
         if (factor > 1) sleep_for((factor - 1) * worked);
         const double processor = processor_s();
-        worker_.worked(
-            {std::max(factor, 1.0) * worked, waited, processor - std::exchange(told_processor_, processor)});
+        worker_.end_step({std::max(factor, 1.0) * worked, waited,
+                          processor - std::exchange(reported_processor_s_, processor)});
         idle_since_ = Clock::now();
     }
     [[nodiscard]] double processor_s() const {
@@ -97,12 +96,12 @@ private:
     void send_all() {
         for (const std::vector<std::uint8_t>& message : worker_.outgoing()) send(message);
     }
-    /// The application may be busy, with pictures, and take what it can.
+    /// The application may be busy with pictures; then sending waits.
     void send(const std::vector<std::uint8_t>& bytes) {
         while (!through_signals([&] { return socket_.send(zmq::buffer(bytes), zmq::send_flags::none); }))
-            if (pulse_.application_gone()) return;
+            if (heartbeat_.application_gone()) return;
     }
-    /// Until something comes, or a signal, or a look at the application is due.
+    /// Until a message or a signal comes, or the application has to be checked.
     void wait() {
         zmq::pollitem_t item = {socket_.handle(), 0, ZMQ_POLLIN, 0};
         try {
@@ -113,25 +112,26 @@ private:
     }
 
     zmq::socket_t& socket_;
-    Pulse& pulse_;
+    Heartbeat& heartbeat_;
     int threads_;  ///< of a step
     SharedWorldWorker worker_;
     std::uint32_t number_;
     bool draining_ = false, refused_ = false;
     Clock::time_point idle_since_ = Clock::now();
-    std::optional<Clock::time_point> offered_since_;  ///< the offer whose answer the next step waits for
-    double told_processor_ = processor_s();
+    /// Time of the offer whose answer the next step waits for.
+    std::optional<Clock::time_point> offered_since_;
+    double reported_processor_s_ = processor_s();
 };
 
 }  // namespace
 
-int serve_world(zmq::socket_t& socket, Pulse& pulse, int threads, const SceneMessage& scene) {
-    pulse.joined(scene.worker);
-    WorldService service(socket, pulse, threads, scene);
+int serve_world(zmq::socket_t& socket, Heartbeat& heartbeat, int threads, const SceneMessage& scene) {
+    heartbeat.joined(scene.worker);
+    WorldService service(socket, heartbeat, threads, scene);
     try {
         return service.serve();
     } catch (const std::exception& e) {
-        service.report(e.what());
+        service.report_failure(e.what());
         throw;
     }
 }

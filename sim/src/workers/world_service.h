@@ -4,9 +4,10 @@
 
 namespace sim {
 
-/// Serves a world: a SharedWorldWorker behind a socket to the application; so many `threads` share out its steps. Drains
-/// when asked to leave (leave_signals.h). Returns the exit status: 0 at the run's end or when drained, 1 when refused or
-/// when the application is gone.
-[[nodiscard]] int serve_world(zmq::socket_t& socket, Pulse& pulse, int threads, const SceneMessage& scene);
+/// Runs a SharedWorldWorker behind a socket to the application. `threads` share out each of its steps. It
+/// leaves in order when a signal asks for that (signals.h). Returns the exit status: 0 at the run's end or
+/// after it has left, 1 if it was refused or the application is gone.
+[[nodiscard]] int serve_world(zmq::socket_t& socket, Heartbeat& heartbeat, int threads,
+                              const SceneMessage& scene);
 
 }  // namespace sim

@@ -34,7 +34,7 @@ public:
         }
         inbox_.resize(static_cast<std::size_t>(workers)), outbox_.resize(inbox_.size()),
             waits_.resize(inbox_.size());
-        for (auto& e : exchanges_) e->members({members}, 0);
+        for (auto& e : exchanges_) e->set_members({members}, 0);
         for (int w = 0; w < workers; ++w) {
             Ownership ownership;
             ownership.owner = static_cast<std::uint32_t>(w);
@@ -42,7 +42,7 @@ public:
                 if (owner[b] == w)
                     ownership.bodies.push_back(exchanges_[0]->world().record(static_cast<int>(b)));
             ++epoch_;
-            for (auto& e : exchanges_) e->own(ownership, epoch_);
+            for (auto& e : exchanges_) e->set_owner(ownership, epoch_);
         }
         for (int w = 0; w < workers; ++w) known_epoch_[static_cast<std::size_t>(w)] = epoch_;
     }
@@ -68,13 +68,13 @@ public:
         if (found == agreed_.end() || waits_[seller] > 0) return false;
         const auto [buyer, body, step] = found->second;
         if (exchanges_[seller]->steps_done() < step || exchanges_[buyer]->steps_done() < step ||
-            !exchanges_[seller]->may_give())
+            !exchanges_[seller]->may_hand_over())
             return false;
         agreed_.erase(found);
         if (!exchanges_[seller]->world().own(body) || exchanges_[seller]->at_end() ||
             exchanges_[seller]->own_bodies() == 1)
             return false;
-        const Handover sold = exchanges_[seller]->give({static_cast<std::uint32_t>(body)});
+        const Handover sold = exchanges_[seller]->hand_over({static_cast<std::uint32_t>(body)});
         Ownership ownership;
         ownership.owner = static_cast<std::uint32_t>(buyer),
         ownership.from = static_cast<std::uint32_t>(seller);
@@ -192,15 +192,15 @@ private:
         inbox_[w].pop_front();
         if (sent.sold) {
             known_epoch_[w] = sent.epoch;
-            exchanges_[w]->own(*sent.sold, sent.epoch);
+            exchanges_[w]->set_owner(*sent.sold, sent.epoch);
             if (w == sent.sold->from || w == sent.sold->owner) --waits_[w];
             return;
         }
         DecodedMessage message = decode_message(sent.bytes);
         if (auto* told = std::get_if<NeighbourMessage>(&message.message))
-            exchanges_[w]->take(message.header, std::move(*told));
+            exchanges_[w]->receive(message.header, std::move(*told));
         else
-            exchanges_[w]->take(message.header, std::get<FoundMessage>(std::move(message.message)));
+            exchanges_[w]->receive(message.header, std::get<FoundMessage>(std::move(message.message)));
     }
     void publish(const DecodedMessage& message) {
         const auto* update = std::get_if<UpdateMessage>(&message.message);
@@ -431,7 +431,7 @@ TEST(BoundedExchange, HeapsOfBodiesThatReboundComeToRest) {
         private:
             double &fastest_, &late_;
         } record(fastest, late);
-        (void)simulate_processors(scene, settings, world_test::processors(10), record);
+        (void)sim_bench::simulate_processors(scene, settings, world_test::processors(10), record);
         // They start with at most 2.8 m/s, and gain 3.5 m/s by falling from the top.
         EXPECT_LT(fastest, 5) << seed;
         EXPECT_LT(late, 0.3) << seed;
@@ -458,7 +458,8 @@ TEST(BoundedExchange, UntilRestARunGoesOnWhenItsLastEventReleasesASleeper) {
         bool asleep_at_event = false;
         double height = 0;
     } record;
-    const DistributedResult result = simulate_processors(scene, settings, world_test::processors(2), record);
+    const DistributedResult result =
+        sim_bench::simulate_processors(scene, settings, world_test::processors(2), record);
     EXPECT_TRUE(record.asleep_at_event) << "else this shows nothing";
     EXPECT_TRUE(result.rest_reached);
     EXPECT_GT(result.steps, 230u) << "it falls for more than half a second";
@@ -485,7 +486,7 @@ TEST(BoundedExchange, BodiesThatAnEventAddsTakePartWhoeverOwnsThem) {
             } record;
             DistributedSettings settings = world_test::for_steps(step + 240);
             settings.bound = 0;
-            (void)simulate_processors(scene, settings, world_test::processors(workers), record);
+            (void)sim_bench::simulate_processors(scene, settings, world_test::processors(workers), record);
             const World expected = world_test::alone(scene, settings.steps);
             ASSERT_EQ(record.now.size(), 5u);
             // At rest on the shelf, and beside the ball that it fell on: where it rolled to may differ out of step.
@@ -502,15 +503,15 @@ TEST(BoundedExchange, NobodyBeginsBeforeAllOwnersAreKnown) {
     scene.settings.bound = 1, scene.settings.steps = 100;
     const auto exchange = std::make_unique<BoundedExchange>(scene);
     exchange->send_by([](auto&&) {});
-    exchange->members({{0, 1}, true}, 1);
+    exchange->set_members({{0, 1}, true}, 1);
     for (const std::uint32_t owner : {0u, 1u}) {
         Ownership ownership;
         ownership.owner = owner;
         ownership.bodies = {exchange->world().record(static_cast<int>(owner))};
-        exchange->own(ownership, owner + 1);
+        exchange->set_owner(ownership, owner + 1);
         EXPECT_FALSE(exchange->ready());
     }
-    exchange->members({{0, 1}, false}, 3);
+    exchange->set_members({{0, 1}, false}, 3);
     int steps = 0;
     for (; exchange->ready() && steps < 100; ++steps) exchange->step();
     EXPECT_EQ(steps, 2);  // one ahead of who has done none, and then waits

@@ -66,7 +66,7 @@ TEST(Columns, FirstOwnersOfRandomPilesCutNoStackAndShareOutEvenly) {
         std::vector<Eigen::Vector3d> places;
         for (int i = 0; i < 400; ++i)
             places.emplace_back(draw.between(-6, 6), 0.5 + i % 4, draw.between(-6, 6));
-        const auto lots = sim::joined_lots(scene);
+        const auto lots = sim::tied_groups(scene);
         const std::vector<int> owner = first_owners(columns, lots, places, workers);
         std::vector<std::optional<sim::Column>> column(places.size());
         columns.assign(Places(places.begin(), places.end()), column);
@@ -114,7 +114,7 @@ TEST(Columns, LotsAreAllThatAWorkerHasInAColumnAndWhatASaleShortensItsReturnLeng
         const auto back = std::ranges::find(second.lots(), lot.column, &sim::Holdings::Lot::column);
         ASSERT_NE(back, second.lots().end());
         if (back->bodies.size() == lot.bodies.size()) {  // it had nothing there
-            EXPECT_EQ(second.shortens(*back, 0), -first.shortens(lot, 1));
+            EXPECT_EQ(second.border_saved(*back, 0), -first.border_saved(lot, 1));
         }
         owner = before;
     }

@@ -23,31 +23,31 @@ void run_with_a_liar(unsigned seed, int messages, int& sent) {
     settings.bound = 2;
     settings.steps = 60;
     world_test::Record record;
-    Coordinator meeting(world_test::busy_scene(), settings, record);
+    Coordinator coordinator(world_test::busy_scene(), settings, record);
     std::map<std::uint32_t, std::unique_ptr<SharedWorldWorker>> workers;
     std::mt19937 random(seed);
-    for (int i = 0; i < 3; ++i) (void)meeting.join({});
+    for (int i = 0; i < 3; ++i) (void)coordinator.join({});
     auto deliver = [&] {
-        for (const Coordinator::Outgoing& out : meeting.outgoing())
+        for (const Coordinator::Outgoing& out : coordinator.outgoing())
             for (const std::uint32_t to : out.to) {
                 DecodedMessage message = decode_message(*out.bytes);
                 if (const auto* scene = std::get_if<SceneMessage>(&message.message))
                     workers[to] = std::make_unique<SharedWorldWorker>(*scene);
                 else if (workers.count(to) > 0)
-                    workers[to]->take(message.header, std::move(message.message));
+                    workers[to]->receive(message.header, std::move(message.message));
             }
     };
     deliver();
-    meeting.start();
+    coordinator.start();
     int damaged = 0, idle = 0;
-    for (int turn = 0; turn < 2000 && !meeting.finished(); ++turn) {
+    for (int turn = 0; turn < 2000 && !coordinator.finished(); ++turn) {
         deliver();
         // As the application does after 30 s.
-        if (++idle > 20) meeting.lose_slowest("nothing was published"), idle = 0;
+        if (++idle > 20) coordinator.lose_slowest("nothing was published"), idle = 0;
         for (auto& [number, worker] : workers) {
             if (worker->ready()) {
                 worker->step();
-                worker->worked({.seconds = 1e-3 * (number + 1)});
+                worker->end_step({.seconds = 1e-3 * (number + 1)});
                 idle = 0;
             }
             for (std::vector<std::uint8_t>& bytes : worker->outgoing()) {
@@ -55,13 +55,13 @@ void run_with_a_liar(unsigned seed, int messages, int& sent) {
                 for (unsigned n = lies ? 1 + random() % 3 : 0; n > 0; --n)
                     bytes[12 + random() % (bytes.size() - 12)] = static_cast<std::uint8_t>(random());
                 if (lies) sim_test::seal(bytes), ++damaged;
-                meeting.take(number, bytes), meeting.advance();
+                coordinator.receive(number, bytes), coordinator.advance();
             }
         }
     }
     sent += damaged;
-    EXPECT_TRUE(meeting.finished()) << "seed " << seed << ": " << record.notes;
-    EXPECT_EQ(meeting.result().steps, 60u) << "seed " << seed;
+    EXPECT_TRUE(coordinator.finished()) << "seed " << seed << ": " << record.notes;
+    EXPECT_EQ(coordinator.result().steps, 60u) << "seed " << seed;
 }
 
 TEST(Damage, OfAMembersMessagesCrashesNobodyAndTheOthersFinish) {
@@ -79,35 +79,36 @@ struct Three {
         DistributedSettings settings;
         settings.bound = 2, settings.steps = 60;
         settings.market.from_step = 5;
-        Coordinator meeting(world_test::busy_scene(), settings, record);
-        for (int i = 0; i < 3; ++i) (void)meeting.join({});
-        meeting.start();
+        Coordinator coordinator(world_test::busy_scene(), settings, record);
+        for (int i = 0; i < 3; ++i) (void)coordinator.join({});
+        coordinator.start();
         int idle = 0;
-        for (int turn = 0; turn < 4000 && !meeting.finished(); ++turn) {
-            for (const Coordinator::Outgoing& out : meeting.outgoing())
+        for (int turn = 0; turn < 4000 && !coordinator.finished(); ++turn) {
+            for (const Coordinator::Outgoing& out : coordinator.outgoing())
                 for (const std::uint32_t to : out.to) {
                     DecodedMessage m = decode_message(*out.bytes);
                     if (const auto* scene = std::get_if<SceneMessage>(&m.message))
                         workers[to] = std::make_unique<SharedWorldWorker>(*scene);
                     else
-                        workers.at(to)->take(m.header, std::move(m.message));
+                        workers.at(to)->receive(m.header, std::move(m.message));
                 }
             // As the application does after 15 and 30 s.
-            if (idle == 20) meeting.note_waiting();
-            if (++idle > 40) meeting.lose_slowest("nothing was published"), idle = 0;
+            if (idle == 20) coordinator.note_waiting();
+            if (++idle > 40) coordinator.lose_slowest("nothing was published"), idle = 0;
             for (auto& [number, worker] : workers) {
-                if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3}), idle = 0;
+                if (worker->ready()) worker->step(), worker->end_step({.seconds = 1e-3}), idle = 0;
                 for (const std::vector<std::uint8_t>& bytes : worker->outgoing()) {
                     const DecodedMessage m = decode_message(bytes);
                     const auto* told = std::get_if<NeighbourMessage>(&m.message);
-                    if (!told || passes(number, told->to)) meeting.take(number, bytes), meeting.advance();
+                    if (!told || passes(number, told->to))
+                        coordinator.receive(number, bytes), coordinator.advance();
                 }
-                more(meeting, number, *worker);
+                more(coordinator, number, *worker);
             }
         }
-        EXPECT_TRUE(meeting.finished()) << record.notes;
+        EXPECT_TRUE(coordinator.finished()) << record.notes;
         for (std::uint32_t worker = 0; worker < 3; ++worker)
-            if (meeting.is_member(worker)) members.push_back(worker);
+            if (coordinator.is_member(worker)) members.push_back(worker);
     }
     std::function<void(Coordinator&, std::uint32_t, SharedWorldWorker&)> more =
         [](Coordinator&, std::uint32_t, SharedWorldWorker&) {};
@@ -134,18 +135,18 @@ TEST(Damage, OfAFloodingMemberIsBounded) {
     DistributedSettings settings;
     settings.bound = 2, settings.steps = 60;
     world_test::Record record;
-    Coordinator meeting(world_test::busy_scene(), settings, record);
-    for (int i = 0; i < 3; ++i) (void)meeting.join({});
-    meeting.start();
-    (void)meeting.outgoing();
+    Coordinator coordinator(world_test::busy_scene(), settings, record);
+    for (int i = 0; i < 3; ++i) (void)coordinator.join({});
+    coordinator.start();
+    (void)coordinator.outgoing();
     Offer offer{1, 1, std::vector<std::uint32_t>(100'000, 0), std::vector<float>(100'000, 0.1F)};
     std::size_t relayed = 0, sent = 0;
-    for (; sent < 100'000 && meeting.members().size() == 3; ++sent) {
+    for (; sent < 100'000 && coordinator.members().size() == 3; ++sent) {
         if (sent == 1) offer.bodies.resize(1), offer.cost_s.resize(1);
-        meeting.take(0, encode({0, 0, 0}, offer));
-        for (const Coordinator::Outgoing& out : meeting.outgoing()) relayed += out.bytes->size();
+        coordinator.receive(0, encode({0, 0, 0}, offer));
+        for (const Coordinator::Outgoing& out : coordinator.outgoing()) relayed += out.bytes->size();
     }
-    EXPECT_EQ(meeting.members(), (std::vector<std::uint32_t>{1, 2}));
+    EXPECT_EQ(coordinator.members(), (std::vector<std::uint32_t>{1, 2}));
     EXPECT_GT(sent, 300u);  // an honest one has room
     EXPECT_LT(sent, 600u);
     EXPECT_LT(relayed, 2u << 20);
@@ -157,18 +158,18 @@ TEST(Offers, ForAStructureThatNobodyAskedForReachNobody) {
     DistributedSettings settings;
     settings.bound = 2, settings.steps = 60;
     world_test::Record record;
-    Coordinator meeting(world_test::busy_scene(), settings, record);
-    for (int i = 0; i < 2; ++i) (void)meeting.join({});
-    meeting.start();
-    (void)meeting.outgoing();
+    Coordinator coordinator(world_test::busy_scene(), settings, record);
+    for (int i = 0; i < 2; ++i) (void)coordinator.join({});
+    coordinator.start();
+    (void)coordinator.outgoing();
     std::uint32_t own = 0;
-    while (meeting.owner(static_cast<int>(own)) != 0) ++own;
+    while (coordinator.owner(static_cast<int>(own)) != 0) ++own;
     // Of a body, of none, and one as usual.
     const std::vector<Offer> offers = {
         {1, 1, {own}, {0.1F}, true}, {1, 2, {}, {}, true}, {1, 3, {own}, {0.1F}, false}};
     for (const Offer& offer : offers) {
-        meeting.take(0, encode({0, 0, 0}, offer));
-        const std::vector<Coordinator::Outgoing> sent = meeting.outgoing();
+        coordinator.receive(0, encode({0, 0, 0}, offer));
+        const std::vector<Coordinator::Outgoing> sent = coordinator.outgoing();
         ASSERT_EQ(sent.size(), 1u);
         EXPECT_EQ(sent[0].to, std::vector<std::uint32_t>{offer.gathers ? 0u : 1u});
         const DecodedMessage message = decode_message(*sent[0].bytes);
@@ -186,15 +187,15 @@ TEST(Offers, WhoNeverHandsOverWhatItSoldIsGivenUp) {
     for (const std::uint32_t liar : {0u, 1u, 2u}) {
         Three three;
         bool offered = false;
-        three.more = [&](Coordinator& meeting, std::uint32_t number, SharedWorldWorker& worker) {
+        three.more = [&](Coordinator& coordinator, std::uint32_t number, SharedWorldWorker& worker) {
             if (number != liar || worker.steps_done() < 10 || offered) return;
             for (std::uint32_t body = 0; body < 14; ++body) {
-                if (meeting.owner(static_cast<int>(body)) != liar) continue;
+                if (coordinator.owner(static_cast<int>(body)) != liar) continue;
                 offered = true;
                 for (const std::uint32_t to : {(liar + 1) % 3, (liar + 2) % 3}) {
-                    meeting.take(liar,
-                                 encode({liar, 0, worker.steps_done()}, Offer{to, 99, {body}, {1e-9F}}));
-                    meeting.advance();
+                    coordinator.receive(
+                        liar, encode({liar, 0, worker.steps_done()}, Offer{to, 99, {body}, {1e-9F}}));
+                    coordinator.advance();
                 }
                 return;
             }
@@ -211,14 +212,14 @@ TEST(Offers, OfNothingAndAnswersThatNobodyWaitsForHaveNobodyElseGivenUp) {
     for (const int kind : {0, 1, 2}) {
         Three three;
         int told = 0;
-        three.more = [&](Coordinator& meeting, std::uint32_t number, SharedWorldWorker& worker) {
-            if (number != 2 || worker.steps_done() < 3 || told > 40 || !meeting.is_member(2)) return;
+        three.more = [&](Coordinator& coordinator, std::uint32_t number, SharedWorldWorker& worker) {
+            if (number != 2 || worker.steps_done() < 3 || told > 40 || !coordinator.is_member(2)) return;
             for (const std::uint32_t to : {0u, 1u}) {
                 const OfferAnswer answer{to, static_cast<std::uint32_t>(told / 4), true};
                 const WorkerMessage message = kind == 0 ? WorkerMessage(Offer{to, 9, {}, {}}) : answer;
-                if (!meeting.is_member(2)) return;
-                meeting.take(2, encode({2, 0, kind == 2 ? 60 : worker.steps_done()}, message));
-                meeting.advance();
+                if (!coordinator.is_member(2)) return;
+                coordinator.receive(2, encode({2, 0, kind == 2 ? 60 : worker.steps_done()}, message));
+                coordinator.advance();
                 ++told;
             }
         };

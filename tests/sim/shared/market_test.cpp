@@ -20,7 +20,7 @@ public:
         sim::MarketSettings settings;
         std::vector<std::uint32_t> members;
         for (int i = 0; i < workers; ++i) members.push_back(static_cast<std::uint32_t>(i));
-        for (const std::uint32_t i : members) markets_.emplace_back(i, settings, 0).members(members);
+        for (const std::uint32_t i : members) markets_.emplace_back(i, settings, 0).set_members(members);
         for (int p = 0; p < piles; ++p)
             for (int x = 0; x < wide; ++x)
                 for (int y = 0; y < deep; ++y) columns.push_back({x + 1000 * p, y});
@@ -58,12 +58,13 @@ public:
         for (std::uint32_t w = 0; w < markets_.size(); ++w) {
             sim::Market& market = markets_[w];
             const double work = seconds(w) / speed[w];
-            if (own(w) > 0) market.worked(step_, seconds(w), work, own(w));
+            if (own(w) > 0) market.end_step(step_, seconds(w), work, own(w));
             sim::StepReport report;
             report.smoothed_s = static_cast<float>(market.smoothed());
             report.own = static_cast<std::uint32_t>(own(w));
             for (std::uint32_t other = 0; own(w) > 0 && other < markets_.size(); ++other)
-                if (other != w) markets_[other].heard({w, epoch_, step_}, report.smoothed_s, report.own);
+                if (other != w)
+                    markets_[other].receive_report({w, epoch_, step_}, report.smoothed_s, report.own);
         }
         for (std::uint32_t w = 0; w < markets_.size(); ++w) {
             if (!markets_[w].wants_to_sell()) continue;
@@ -72,7 +73,7 @@ public:
             offered = *offer;
             const sim::OfferAnswer answer = markets_[offer->to].answer(w, *offer);
             EXPECT_TRUE(answer.accepted) << "step " << step_ << ", " << w << " to " << offer->to;
-            markets_[w].answered(offer->to, {w, offer->number, answer.accepted});
+            markets_[w].receive_answer(offer->to, {w, offer->number, answer.accepted});
             if (!markets_[w].hand_over()) continue;
             sim::Ownership ownership;
             ownership.owner = offer->to, ownership.from = w, ownership.traded = true, ownership.step = step_;
@@ -81,7 +82,7 @@ public:
                 ownership.bodies.emplace_back().body = static_cast<int>(body);
             }
             ++epoch_;
-            for (sim::Market& market : markets_) market.registered(epoch_, ownership);
+            for (sim::Market& market : markets_) market.register_sale(epoch_, ownership);
             sold += static_cast<int>(offer->bodies.size());
         }
         return sold;
@@ -240,11 +241,11 @@ TEST(MarketRun, AllOnOneIsLevelWithinTenStepsThenAtMostOneSaleInTwentyOrTen) {
             for (const bool steady : {true, false}) {
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
                 const sim::DistributedSettings settings = all_on_one(300);
-                sim::SimulatedProcessors how = processors(workers);
+                sim_bench::SimulatedProcessors how = processors(workers);
                 how.latency_s = 2e-6;
                 if (!steady) how.factor = unsteady;
                 Sales record;
-                const auto result = sim::simulate_processors(scene, settings, how, record);
+                const auto result = sim_bench::simulate_processors(scene, settings, how, record);
                 EXPECT_EQ(result.refused_messages, 0u) << record.notes;
                 const double column = double(workers) / double(scene.world.bodies.size());
                 const std::string what = std::to_string(workers) + " workers, " +
@@ -264,10 +265,10 @@ TEST(MarketRun, AllOnOneIsLevelWithinTenStepsHoweverLongMessagesTake) {
             for (const double latency : {2e-4, 2e-2}) {  // a step of one takes 30 to 400 us
                 const sim::WorldScene scene = at_rest(wide, wide == 6 ? 5 : 20);
                 const sim::DistributedSettings settings = all_on_one(30);
-                sim::SimulatedProcessors how = processors(workers);
+                sim_bench::SimulatedProcessors how = processors(workers);
                 how.latency_s = latency;
                 Record record;
-                (void)sim::simulate_processors(scene, settings, how, record);
+                (void)sim_bench::simulate_processors(scene, settings, how, record);
                 const double column = double(workers) / double(scene.world.bodies.size());
                 EXPECT_LE(excess(record, workers, 20), std::max(0.15, 1.05 * column))
                     << workers << " workers, " << scene.world.bodies.size() << " bodies, " << latency;
@@ -281,11 +282,11 @@ TEST(MarketRun, OneWorkerAtHalfSpeedCostsLittleWithBalancing) {
         for (const bool trade : {false, true}) {
             sim::DistributedSettings settings = for_steps(800);
             settings.market.trade = trade;
-            sim::SimulatedProcessors how = processors(5);
+            sim_bench::SimulatedProcessors how = processors(5);
             how.latency_s = 2e-6;
             how.factor = [slow](int worker, std::uint64_t) { return worker == slow ? 2.0 : 1.0; };
             Record record;
-            elapsed[trade] = sim::simulate_processors(scene, settings, how, record).elapsed_s;
+            elapsed[trade] = sim_bench::simulate_processors(scene, settings, how, record).elapsed_s;
         }
         // 2 / (5 / 4.5) = 1.8 at best; the first 10 steps and the sale take their time.
         EXPECT_GT(elapsed[0] / elapsed[1], 1.5) << slow;

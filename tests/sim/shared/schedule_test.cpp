@@ -51,7 +51,7 @@ TEST(Schedule, OfBatsDoorsSlidersAndForcesWorkersKeepTheMomentum) {
             }
         } record;
         const sim::DistributedResult result =
-            sim::simulate_processors(scene, for_steps(110), processors(workers), record);
+            sim_bench::simulate_processors(scene, for_steps(110), processors(workers), record);
         EXPECT_LT((record.momentum - record.first - result.outside_impulse).norm(),
                   1e-9 * result.outside_impulse.norm())
             << workers;
@@ -87,7 +87,7 @@ TEST(Schedule, BoundedWorkersGiveEveryForceOnce) {
             }
         } record;
         const sim::DistributedResult result =
-            sim::simulate_processors(scene, settings, processors(3), record);
+            sim_bench::simulate_processors(scene, settings, processors(3), record);
         EXPECT_LT((result.outside_impulse - all).norm(), 1e-9 * all.norm()) << bound;
         EXPECT_LT((record.momentum - all).norm(), 1e-9 * all.norm()) << bound;  // the last states are exact
     }

@@ -185,12 +185,11 @@ TEST(Structures, ThatEventsCompleteArePlannedUntilAllHasCome) {
     scene.world.bodies.pop_back();
     for (const bool shower : {false, true}) {
         if (shower) scene.later.assign(3, box({0, 9, 0}, {0.5, 0.5, 0.5}));
-        const sim::PlannedStructures planned(scene, 1, 0.2);
-        for (const int there : {4, 5}) {
-            Bodies found = {{7}};
-            planned.add_unfinished(there, found);
-            EXPECT_EQ(found, (!shower && there == 4 ? Bodies{{7}, {0, 1, 2, 3, 4}} : Bodies{{7}}));
-        }
+        const sim::StructureFinder finder(scene, 1, 0.2);
+        sim::SharedWorld world(scene.world);
+        EXPECT_EQ(finder.flat(world, {}), (shower ? Bodies{} : Bodies{{0, 1, 2, 3, 4}}));
+        for (const sim::WorldBody& body : scene.later) (void)world.add_body(body);
+        EXPECT_TRUE(finder.flat(world, {}).empty());
     }
 }
 
@@ -232,13 +231,13 @@ TEST(Structures, StandOutOfStepAsInOneProcessAndAreNeverSoldInParts) {
             double half_way = 0;
             for (const int killed : {-1, 0, 1}) {
                 Moved record;
-                sim::SimulatedProcessors how = processors(workers);
+                sim_bench::SimulatedProcessors how = processors(workers);
                 if (killed >= 0) {
-                    how.failures = {{half_way, killed, sim::SimulatedProcessors::Failure::Kind::kill}};
+                    how.failures = {{half_way, killed, sim_bench::SimulatedProcessors::Failure::Kind::kill}};
                     how.silence_s = half_way / 8;
                 }
                 const sim::DistributedResult result =
-                    sim::simulate_processors(scene, bounded(480, 4), how, record);
+                    sim_bench::simulate_processors(scene, bounded(480, 4), how, record);
                 half_way = result.elapsed_s / 2;
                 EXPECT_EQ(result.steps, 480u);
                 EXPECT_EQ(result.lost, killed < 0 ? 0 : 1);
@@ -305,16 +304,17 @@ TEST(Structures, ThatFormOutOfStepAreGatheredByOneWorkerAndStandAsInOneProcess) 
                         }
                         std::vector<Eigen::Vector3d> places;
                     } record;
-                    sim::SimulatedProcessors how = processors(3);
+                    sim_bench::SimulatedProcessors how = processors(3);
                     sim::DistributedSettings settings = bounded(steps, bound);
                     settings.market.trade = side < 0.2;  // with and without balancing
                     if (killed >= 0) {
                         // While it falls.
-                        how.failures = {{end / 6, killed, sim::SimulatedProcessors::Failure::Kind::kill}};
+                        how.failures = {
+                            {end / 6, killed, sim_bench::SimulatedProcessors::Failure::Kind::kill}};
                         how.silence_s = end / 100;
                     }
                     const sim::DistributedResult result =
-                        sim::simulate_processors(scene, settings, how, record);
+                        sim_bench::simulate_processors(scene, settings, how, record);
                     end = killed < 0 ? result.elapsed_s : end;
                     EXPECT_EQ(result.steps, steps);
                     ASSERT_EQ(record.places.size(), 10u);
@@ -355,7 +355,7 @@ TEST(Structures, AmongBallsAreNotSoldAndGatheredAgainForEver) {
     for (const int late : {0, 1}) {
         Moved record;
         trades[late] =
-            sim::simulate_processors(scene, bounded(late ? 600 : 300, 4), processors(3), record).trades;
+            sim_bench::simulate_processors(scene, bounded(late ? 600 : 300, 4), processors(3), record).trades;
     }
     EXPECT_LE(trades[1], trades[0] + 4);  // balls may still be sold; the wall went to and fro eight times
 }
@@ -379,18 +379,18 @@ TEST(Structures, ABoardThatFallsOnAHeapIsNotThrownUpOutOfStep) {
         }
         Moved record;
         const sim::DistributedResult result =
-            sim::simulate_processors(scene, bounded(120, 4), processors(5), record);
+            sim_bench::simulate_processors(scene, bounded(120, 4), processors(5), record);
         EXPECT_EQ(result.steps, 120u);
         EXPECT_EQ(result.trades, 0u);
         EXPECT_TRUE(result.one_owner);
         EXPECT_LT(record.fastest, 5);  // falls by 0.35 m: 2.6 m/s, and slides down
         // Whoever leaves, also before the board comes: all bodies go to one other worker.
-        sim::SimulatedProcessors how = processors(5);
+        sim_bench::SimulatedProcessors how = processors(5);
         for (int worker = 0; worker < 4; ++worker)
             how.failures.push_back({result.elapsed_s * (worker + 1) / 24, worker,
-                                    sim::SimulatedProcessors::Failure::Kind::drain});
+                                    sim_bench::SimulatedProcessors::Failure::Kind::drain});
         Moved drained;
-        EXPECT_EQ(sim::simulate_processors(scene, bounded(120, 4), how, drained).steps, 120u);
+        EXPECT_EQ(sim_bench::simulate_processors(scene, bounded(120, 4), how, drained).steps, 120u);
         EXPECT_EQ(drained.own[4], 76);
         EXPECT_LT(drained.fastest, 5);
     }

@@ -15,7 +15,7 @@
 #include "shared_scenes.h"
 
 using namespace world_test;
-using Failure = sim::SimulatedProcessors::Failure;
+using Failure = sim_bench::SimulatedProcessors::Failure;
 using Kind = Failure::Kind;
 
 namespace {
@@ -31,8 +31,8 @@ sim::DistributedSettings trading() {
     return settings;
 }
 
-sim::SimulatedProcessors processors() {
-    sim::SimulatedProcessors how;
+sim_bench::SimulatedProcessors processors() {
+    sim_bench::SimulatedProcessors how;
     how.count = kWorkers;
     how.modelled = true;
     return how;
@@ -70,17 +70,17 @@ TEST(TradeFailures, AtEveryStageOfATradeLeaveEveryBodyWithOneOwnerAndTheRunFinis
     const sim::WorldScene scene = busy_scene();
     const sim::DistributedSettings settings = trading();
     Record whole;
-    const auto unharmed = sim::simulate_processors(scene, settings, processors(), whole);
+    const auto unharmed = sim_bench::simulate_processors(scene, settings, processors(), whole);
     ASSERT_GE(unharmed.trades, 2u);
     EXPECT_EQ(unharmed.refused_messages, 0u) << whole.notes;
     const double silence = unharmed.elapsed_s / 8;
     std::uint64_t reowned = 0;
     for (const std::vector<Failure>& some : failures(unharmed.elapsed_s, silence)) {
-        sim::SimulatedProcessors how = processors();
+        sim_bench::SimulatedProcessors how = processors();
         how.silence_s = silence;
         how.failures = some;
         Record record;
-        const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+        const sim::DistributedResult result = sim_bench::simulate_processors(scene, settings, how, record);
         SCOPED_TRACE(std::to_string(static_cast<int>(some[0].kind)) + " of " +
                      std::to_string(some[0].worker) + " at " + std::to_string(some[0].time_s));
         EXPECT_EQ(result.steps, kSteps);
@@ -107,7 +107,7 @@ TEST(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAnd
         SCOPED_TRACE("seed " + std::to_string(seed));
         std::mt19937 random(seed + 1);
         auto uniform = [&random] { return static_cast<double>(random()) / 4294967296.0; };
-        sim::SimulatedProcessors how = processors();
+        sim_bench::SimulatedProcessors how = processors();
         how.count = 1 + static_cast<int>(random() % 5);
         how.latency_s = 1e-5 * std::pow(30, uniform());
         settings.all_to_first = seed % 2 == 0;
@@ -128,7 +128,8 @@ TEST(TradeFailures, DrawnAtRandomWithWanderingLoadsLeaveEveryBodyWithOneOwnerAnd
         // A stopped processor is either lost or goes on.
         Record record;
         sim::DistributedResult result;
-        ASSERT_NO_THROW(result = sim::simulate_processors(scene, settings, how, record)) << record.notes;
+        ASSERT_NO_THROW(result = sim_bench::simulate_processors(scene, settings, how, record))
+            << record.notes;
         EXPECT_EQ(result.steps, settings.steps);
         EXPECT_TRUE(record.in_order);
         const int own = std::accumulate(record.own.begin(), record.own.end(), 0,
@@ -153,33 +154,33 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
             sim::DistributedSettings settings = for_steps(20);
             settings.market.trade = false;
             Record record;
-            sim::Coordinator meeting(scene, settings, record);
+            sim::Coordinator coordinator(scene, settings, record);
             std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
-            for (int i = 0; i < 3; ++i) (void)meeting.join({});
+            for (int i = 0; i < 3; ++i) (void)coordinator.join({});
             const auto deliver = [&] {
-                for (const sim::Coordinator::Outgoing& out : meeting.outgoing())
+                for (const sim::Coordinator::Outgoing& out : coordinator.outgoing())
                     for (const std::uint32_t to : out.to) {
                         sim::DecodedMessage m = sim::decode_message(*out.bytes);
                         if (const auto* with = std::get_if<sim::SceneMessage>(&m.message))
                             workers[to] = std::make_unique<sim::SharedWorldWorker>(*with);
                         else
-                            workers.at(to)->take(m.header, std::move(m.message));
+                            workers.at(to)->receive(m.header, std::move(m.message));
                     }
             };
             const auto send = [&](std::uint32_t number) {
                 for (const std::vector<std::uint8_t>& bytes : workers.at(number)->outgoing())
-                    meeting.take(number, bytes), meeting.advance();
+                    coordinator.receive(number, bytes), coordinator.advance();
             };
             deliver();
-            meeting.start();
-            const std::uint32_t first = meeting.owner(0);
+            coordinator.start();
+            const std::uint32_t first = coordinator.owner(0);
             bool gone = false;
-            for (int turn = 0; turn < 200 && !meeting.finished(); ++turn) {
+            for (int turn = 0; turn < 200 && !coordinator.finished(); ++turn) {
                 deliver();
                 for (auto& [number, worker] : workers) {
                     const bool waits = number != first && !gone && worker->steps_done() >= 17;
                     if ((number == first && gone && !drains) || waits) continue;
-                    if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3});
+                    if (worker->ready()) worker->step(), worker->end_step({.seconds = 1e-3});
                     send(number);
                 }
                 if (gone || workers.at(first)->steps_done() < 20) continue;
@@ -187,13 +188,13 @@ TEST(LastStep, OfBodiesWhoseOwnerIsLostOrLeavesAfterItIsDoneByWhoeverGetsThem) {
                 if (drains)
                     workers.at(first)->drain(), send(first);
                 else
-                    meeting.lose(first, "killed");
+                    coordinator.lose(first, "killed");
             }
             EXPECT_TRUE(gone);
-            EXPECT_TRUE(meeting.finished()) << record.notes;
-            EXPECT_EQ(meeting.steps(), 20u);
-            EXPECT_EQ(meeting.result().lost, drains ? 0 : 1) << record.notes;
-            EXPECT_EQ(meeting.result().refused_messages, 0u) << record.notes;
+            EXPECT_TRUE(coordinator.finished()) << record.notes;
+            EXPECT_EQ(coordinator.steps(), 20u);
+            EXPECT_EQ(coordinator.result().lost, drains ? 0 : 1) << record.notes;
+            EXPECT_EQ(coordinator.result().refused_messages, 0u) << record.notes;
         }
 }
 
@@ -221,16 +222,17 @@ TEST(Leaving, OutOfStepKeepsTheMomentumWhoeverLeavesAndWhenever) {
     for (const int bound : {0, 1, 4, 16})
         for (const int leave : {1, 2, 3}) {
             settings.bound = bound;
-            sim::SimulatedProcessors how = processors();
+            sim_bench::SimulatedProcessors how = processors();
             how.count = 4;
             Record unharmed;
-            const double whole = sim::simulate_processors(scene, settings, how, unharmed).elapsed_s;
+            const double whole = sim_bench::simulate_processors(scene, settings, how, unharmed).elapsed_s;
             for (int k = 0; k < leave; ++k)  // at once, or one after the other
                 how.failures.push_back(
                     {whole * (0.2 + 0.17 * k * (bound % 4)), (bound + k) % how.count, Kind::drain});
             if (leave == 2) how.failures.push_back({0.5 * whole, 0, Kind::join});
             MomentumRecord record;
-            const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+            const sim::DistributedResult result =
+                sim_bench::simulate_processors(scene, settings, how, record);
             SCOPED_TRACE(std::to_string(leave) + " leave, bound " + std::to_string(bound) + record.notes);
             EXPECT_EQ(result.steps, settings.steps);
             EXPECT_EQ(result.left, leave);
@@ -249,7 +251,7 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
         sim::DistributedSettings settings = for_steps(120);
         settings.bound = 16;
         MomentumRecord record;
-        sim::Coordinator meeting(scene, settings, record);
+        sim::Coordinator coordinator(scene, settings, record);
         std::map<std::uint32_t, std::unique_ptr<sim::SharedWorldWorker>> workers;
         std::deque<std::pair<std::size_t, std::vector<std::uint8_t>>> late;  // of worker 0, by rounds
         std::size_t round = 0;
@@ -257,15 +259,15 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
             for (bool more = true; more;) {
                 more = false;
                 for (; !late.empty() && late.front().first <= round; late.pop_front())
-                    meeting.take(0, late.front().second), meeting.advance();
-                for (const sim::Coordinator::Outgoing& out : meeting.outgoing())
+                    coordinator.receive(0, late.front().second), coordinator.advance();
+                for (const sim::Coordinator::Outgoing& out : coordinator.outgoing())
                     for (const std::uint32_t to : out.to) {
                         more = true;
                         sim::DecodedMessage message = sim::decode_message(*out.bytes);
                         if (const auto* of = std::get_if<sim::SceneMessage>(&message.message))
                             workers[to] = std::make_unique<sim::SharedWorldWorker>(*of);
                         else
-                            workers.at(to)->take(message.header, std::move(message.message));
+                            workers.at(to)->receive(message.header, std::move(message.message));
                     }
                 for (auto& [number, worker] : workers)
                     for (std::vector<std::uint8_t>& bytes : worker->outgoing()) {
@@ -273,26 +275,26 @@ TEST(Leaving, BeforeTheStartKeepsTheMomentum) {
                         if (number == 0)
                             late.emplace_back(round + late_by, std::move(bytes));
                         else
-                            meeting.take(number, bytes), meeting.advance();
+                            coordinator.receive(number, bytes), coordinator.advance();
                     }
             }
         };
-        for (int i = 0; i < 3; ++i) (void)meeting.join({});
+        for (int i = 0; i < 3; ++i) (void)coordinator.join({});
         deliver();
         workers.at(0)->drain();
         deliver();
-        meeting.start();
-        for (; !meeting.finished() && round < 2000; ++round) {
+        coordinator.start();
+        for (; !coordinator.finished() && round < 2000; ++round) {
             deliver();
             for (auto& [number, worker] : workers)
-                if (worker->ready()) worker->step(), worker->worked({.seconds = 1e-3});
+                if (worker->ready()) worker->step(), worker->end_step({.seconds = 1e-3});
         }
         SCOPED_TRACE(std::to_string(late_by) + " rounds late: " + record.notes);
-        EXPECT_EQ(meeting.result().left, 1);
-        EXPECT_EQ(meeting.result().lost, 0);
-        EXPECT_EQ(meeting.steps(), 120u);
+        EXPECT_EQ(coordinator.result().left, 1);
+        EXPECT_EQ(coordinator.result().lost, 0);
+        EXPECT_EQ(coordinator.steps(), 120u);
         const double weight = weight_of(sim::World(scene.world));
-        EXPECT_LT((record.momentum - meeting.result().outside_impulse).norm(), 1e-9 * weight * 120 / 60);
+        EXPECT_LT((record.momentum - coordinator.result().outside_impulse).norm(), 1e-9 * weight * 120 / 60);
     }
 }
 
@@ -331,7 +333,7 @@ TEST(Leaving, AndJoiningOutOfStepKeepTheMomentumOfBallsThatRebound) {
             settings.bound = std::array{0, 1, 2, 4, 8, 16, 32, 64}[random() % 8];
             settings.market.from_step = 3;
             settings.all_to_first = random() % 3 == 0;
-            sim::SimulatedProcessors how = processors(2 + static_cast<int>(random() % 5));
+            sim_bench::SimulatedProcessors how = processors(2 + static_cast<int>(random() % 5));
             how.latency_s = 1e-5 * std::pow(30, share());
             how.silence_s = 1e3;
             how.factor = [seed](int worker, std::uint64_t step) {
@@ -345,7 +347,8 @@ TEST(Leaving, AndJoiningOutOfStepKeepTheMomentumOfBallsThatRebound) {
                     {0.06 * share(), static_cast<int>(random() % static_cast<unsigned>(how.count)), kind});
             }
             MomentumRecord record;
-            const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, record);
+            const sim::DistributedResult result =
+                sim_bench::simulate_processors(scene, settings, how, record);
             SCOPED_TRACE("seed " + std::to_string(seed) + (leave ? ", some leave: " : ": ") + record.notes);
             EXPECT_EQ(result.steps, settings.steps);
             EXPECT_EQ(result.lost, 0);

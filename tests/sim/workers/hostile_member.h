@@ -66,13 +66,13 @@ private:
             number_ = scene->worker;
             worker_.emplace(*scene);
         } else if (worker_) {
-            worker_->take(m.header, std::move(m.message));
+            worker_->receive(m.header, std::move(m.message));
         }
     }
     void serve(zmq::socket_t& socket) {
         if (worker_->ready()) {
             worker_->step();
-            worker_->worked({.seconds = 1e-3});
+            worker_->end_step({.seconds = 1e-3});
             ++steps_;
         }
         for (std::vector<std::uint8_t>& bytes : worker_->outgoing()) {

@@ -14,6 +14,7 @@
 
 #include "messages/worker_messages.h"
 #include "processes.h"
+#include "sim/distributed_world.h"
 #include "test_kit.h"
 
 namespace {

@@ -127,15 +127,15 @@ TEST(WorkerGate, AStrangersMessagesAreRefusedAndGarbageIsCountedAndAnsweredByNot
 
 TEST(WorkerGate, HeartbeatsFromASocketOfTheirOwnKeepAMemberAndTheirEndLosesItOnce) {
     sim::WorkerGate gate({"", {}, 0.6});
-    Peer quiet(gate.private_endpoint()), pulse(gate.private_endpoint());
+    Peer quiet(gate.private_endpoint()), heartbeat(gate.private_endpoint());
     join(gate, quiet, 5, {5});
     Peer other(gate.private_endpoint());
     join(gate, other, 6, {6});  // never beats
-    const auto beat = [&] { pulse.send(sim::Beat{{5}}, 5); };
+    const auto beat = [&] { heartbeat.send(sim::Beat{{5}}, 5); };
     const auto lost = wait_for(gate, Kind::lost, beat);
     ASSERT_TRUE(lost);
     EXPECT_EQ(lost->worker, 6u);
-    EXPECT_TRUE(gets<sim::Beat>(pulse));  // answered
+    EXPECT_TRUE(gets<sim::Beat>(heartbeat));  // answered
     const auto then = wait_for(gate, Kind::lost);
     ASSERT_TRUE(then);
     EXPECT_EQ(then->worker, 5u);
@@ -148,21 +148,21 @@ TEST(WorkerGate, NobodyBeatsForAnotherNorKeepsItFromBeating) {
     join(gate, mute, 1, {1, 2, 3});
     join(gate, none, 2, {});  // asked to join without a secret: nobody can beat for it
     join(gate, good, 3, {3});
-    Peer stranger(gate.private_endpoint()), pulse(gate.private_endpoint());
+    Peer stranger(gate.private_endpoint()), heartbeat(gate.private_endpoint());
     std::map<std::uint32_t, int> lost;
     for (int i = 0; i < 300 && (lost[1] == 0 || lost[2] == 0); ++i) {
         // The stranger comes first each time, with every number and with what it may guess.
         for (const std::uint32_t worker : {1u, 2u, 3u})
             for (const sim::Secret& secret : {sim::Secret{}, sim::Secret{1}, sim::Secret{1, 2, 4}})
                 stranger.send(sim::Beat{secret}, worker);
-        pulse.send(sim::Beat{{3}}, 3);
+        heartbeat.send(sim::Beat{{3}}, 3);
         for (const auto& event : gate.wait(10ms))
             if (event.kind == Kind::lost) ++lost[event.worker];
     }
     EXPECT_EQ(lost[1], 1);
     EXPECT_EQ(lost[2], 1);
     EXPECT_EQ(lost[3], 0);
-    EXPECT_TRUE(gets<sim::Beat>(pulse));
+    EXPECT_TRUE(gets<sim::Beat>(heartbeat));
     EXPECT_FALSE(stranger.receive());
 }
 
@@ -232,9 +232,9 @@ TEST(WorkerGate, AMemberThatSendsFasterThanTheApplicationTakesIsHeldBackAndNothi
     sim::WorkerGate gate({"", {}, 0.5});
     Peer fast(gate.private_endpoint());
     join(gate, fast, 1);
-    Peer pulse(gate.private_endpoint());
-    pulse.send(sim::Beat{{1}}, 1);
-    ASSERT_TRUE(gets<sim::Beat>(pulse));
+    Peer heartbeat(gate.private_endpoint());
+    heartbeat.send(sim::Beat{{1}}, 1);
+    ASSERT_TRUE(gets<sim::Beat>(heartbeat));
     constexpr std::uint32_t kMessages = 20000;
     std::jthread sender([&] {
         for (std::uint32_t i = 0; i < kMessages; ++i) fast.send_waiting(sim::OfferAnswer{0, i, true}, 1);
@@ -244,7 +244,7 @@ TEST(WorkerGate, AMemberThatSendsFasterThanTheApplicationTakesIsHeldBackAndNothi
     int beats = 0;
     const auto start = std::chrono::steady_clock::now();
     const auto busy = [&] { return std::chrono::steady_clock::now() - start; };
-    while (busy() < 1s || (beats < 3 && busy() < 20s)) beats += pulse.receive().has_value();
+    while (busy() < 1s || (beats < 3 && busy() < 20s)) beats += heartbeat.receive().has_value();
     EXPECT_GE(beats, 3);
     std::uint32_t next = 0;
     std::size_t most = 0;

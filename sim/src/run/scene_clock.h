@@ -10,7 +10,8 @@ class SceneClock {
 public:
     explicit SceneClock(const WorldScene& scene);  ///< at the start
 
-    /// Applies the events due before step `step` + 1: removes constraints that still hold, adds bodies. Whether there were any.
+    /// Applies the events due before step `step` + 1: removes constraints that still hold, adds bodies.
+    /// Whether there were any.
     bool apply(World& world, std::uint64_t step);
     /// Events, or forces and prescribed motions that have not ended.
     [[nodiscard]] bool events_left() const noexcept { return next_ < scene_.events.size() || busy_; }

@@ -1,29 +1,26 @@
 #include <chrono>
 
-#include "shared/scene_clock.h"
+#include "run/elapsed_time.h"
+#include "run/scene_clock.h"
 #include "sim/distributed_world.h"
-#include "world/processor_time.h"
 
 namespace sim {
 namespace {
 
-double wall_s() {
-    return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 /// One step, timed by the wall and by this thread's processor time.
-void timed_step(World& world, DistributedResult& result, WorkerStep& told) {
-    const double wall = wall_s(), cpu = thread_processor_s();
+void timed_step(World& world, DistributedResult& result, WorkerStep& report) {
+    const auto start = std::chrono::steady_clock::now();
+    const double cpu = thread_processor_s();
     world.step();
-    told.seconds = wall_s() - wall;
-    told.processor_s = thread_processor_s() - cpu;
-    result.elapsed_s += told.seconds;
-    result.cpu_s += told.processor_s;
-    told.step = ++result.steps;
-    told.bodies = world.bodies();
+    report.seconds = seconds_since(start);
+    report.processor_s = thread_processor_s() - cpu;
+    result.elapsed_s += report.seconds;
+    result.cpu_s += report.processor_s;
+    report.step = ++result.steps;
+    report.bodies = world.bodies();
 }
 
-void tell_past(const World& world, DistributedResult& result) {
+void report_mishaps(const World& world, DistributedResult& result) {
     result.outside_impulse = world.outside_impulse();
     result.counts = world.counts();
     result.quarantined = world.quarantined();
@@ -32,7 +29,7 @@ void tell_past(const World& world, DistributedResult& result) {
 
 RunState state_of(const World& world, const DistributedResult& result) {
     RunState state{world.snapshot(), result};
-    tell_past(world, state.result);
+    report_mishaps(world, state.result);
     return state;
 }
 
@@ -51,7 +48,7 @@ DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& 
     world.use_threads(threads);
     SceneClock clock(scene);
     DistributedResult result;
-    WorkerStep told;
+    WorkerStep report;
     const auto rests = [&] { return !clock.events_left() && world.all_asleep(); };
     observer.at(0, world);
     if (from) {
@@ -63,14 +60,14 @@ DistributedResult run_alone(const WorldScene& scene, const DistributedSettings& 
         clock.apply(world, result.steps);
         observer.ready(result.steps, world);
         if (settings.until_rest && rests()) break;
-        timed_step(world, result, told);
-        observer.worked(told);
+        timed_step(world, result, report);
+        observer.worked(report);
         observer.done(result.steps, [&] { return state_of(world, result); });
         observer.at(result.steps, world);
     }
     observer.ready(result.steps, world);
     result.rest_reached = rests();
-    tell_past(world, result);
+    report_mishaps(world, result);
     return result;
 }
 

@@ -2,7 +2,7 @@
 #include <memory>
 #include <vector>
 
-#include "shared/load_watch.h"
+#include "accuracy/load_watch.h"
 #include "sim/accuracy.h"
 
 namespace sim {

@@ -1,4 +1,4 @@
-#include "workers/leave_signals.h"
+#include "workers/signals.h"
 
 #include <signal.h>
 
@@ -9,7 +9,7 @@ namespace sim {
 namespace {
 
 constexpr std::array kSignals{SIGTERM, SIGINT, SIGHUP};
-volatile std::sig_atomic_t asked = 0;  // by which
+volatile std::sig_atomic_t asked = 0;  // the signal that came
 
 }  // namespace
 
@@ -37,6 +37,12 @@ void stop_listening_for_leave() {
         if (before.sa_handler != SIG_IGN) sigaction(signal, &action, nullptr);
     }
     if (asked != 0) raise(asked);
+}
+
+void block_signals() noexcept {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, nullptr);
 }
 
 }  // namespace sim

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "shared/body_choice.h"
+#include "accuracy/body_choice.h"
 
 namespace sim {
 namespace {

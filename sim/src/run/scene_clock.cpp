@@ -1,4 +1,4 @@
-#include "shared/scene_clock.h"
+#include "run/scene_clock.h"
 
 #include <algorithm>
 

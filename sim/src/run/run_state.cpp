@@ -4,7 +4,7 @@
 
 #include "contact/manifold.h"
 #include "messages/world_record_codec.h"
-#include "shared/scene_clock.h"
+#include "run/scene_clock.h"
 #include "sim/errors.h"
 
 namespace sim {

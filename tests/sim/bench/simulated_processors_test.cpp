@@ -8,7 +8,7 @@ using namespace world_test;
 
 namespace {
 
-using Failure = sim::SimulatedProcessors::Failure;
+using Failure = sim_bench::SimulatedProcessors::Failure;
 
 }  // namespace
 
@@ -18,17 +18,18 @@ TEST(SimulatedProcessors, ThatRepeatTheirWorkAloneLeaveTheBitsAlsoThroughDrainsJ
     for (const int bound : {0, 3}) {
         sim::DistributedSettings settings = for_steps(120);
         settings.bound = bound;
-        sim::SimulatedProcessors how = processors(3);
+        sim_bench::SimulatedProcessors how = processors(3);
         how.silence_s = 0.01;
         how.failures = {{0.002, 1, Failure::Kind::drain},
                         {0.004, 0, Failure::Kind::join},
                         {0.006, 2, Failure::Kind::kill}};
         Record once, twice;
-        const sim::DistributedResult result = sim::simulate_processors(scene, settings, how, once);
+        const sim_bench::SimulatedResult result = sim_bench::simulate_processors(scene, settings, how, once);
         EXPECT_EQ(result.cold_caches, 1);
         EXPECT_EQ(result.left + result.lost, 2) << once.notes;
         how.repeat_alone = true;
-        const sim::DistributedResult repeated = sim::simulate_processors(scene, settings, how, twice);
+        const sim_bench::SimulatedResult repeated =
+            sim_bench::simulate_processors(scene, settings, how, twice);
         EXPECT_EQ(twice.hashes, once.hashes);
         EXPECT_EQ(repeated.elapsed_s, result.elapsed_s);
         EXPECT_GT(repeated.cold_caches, 0);
@@ -49,7 +50,7 @@ TEST(SimulatedProcessors, OutOfStepTheLastStatesAreExact) {
     sim::DistributedSettings settings = for_steps(40);
     settings.bound = 4;
     Record record;
-    (void)sim::simulate_processors(scene, settings, processors(3), record);
+    (void)sim_bench::simulate_processors(scene, settings, processors(3), record);
     EXPECT_EQ(record.hashes.back(), alone.back());
     EXPECT_NE(record.hashes.at(20), alone.at(20)) << "else this shows nothing";
 }
@@ -57,7 +58,7 @@ TEST(SimulatedProcessors, OutOfStepTheLastStatesAreExact) {
 TEST(SimulatedProcessors, TellTheirOwnTimeAsProcessorTime) {
     Record record;
     const sim::DistributedResult result =
-        sim::simulate_processors(busy_scene(8), for_steps(10), processors(2), record);
+        sim_bench::simulate_processors(busy_scene(8), for_steps(10), processors(2), record);
     double sum = 0;
     for (const sim::WorkerStep& step : record.steps) {
         EXPECT_EQ(step.processor_s, step.seconds);

@@ -1,4 +1,4 @@
-#include "shared/load_watch.h"
+#include "accuracy/load_watch.h"
 
 #include <algorithm>
 

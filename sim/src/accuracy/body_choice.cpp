@@ -1,4 +1,4 @@
-#include "shared/body_choice.h"
+#include "accuracy/body_choice.h"
 
 #include <algorithm>
 #include <cmath>

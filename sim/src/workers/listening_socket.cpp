@@ -1,4 +1,4 @@
-#include "workers/listening.h"
+#include "workers/listening_socket.h"
 
 #include <fcntl.h>
 #include <linux/filter.h>
@@ -15,8 +15,8 @@ namespace {
 constexpr int kMostConnections = 1000;
 constexpr const char* kMonitor = "inproc://listening";
 
-/// The lowest descriptor that is free in this process: so many at least are open. New ones take the lowest, so
-/// none is ever above what this allows.
+/// The lowest descriptor that is free in this process. So many at least are open. New descriptors take the
+/// lowest number, so none gets a higher one than this.
 int lowest_free(int descriptor) noexcept {
     const int free = fcntl(descriptor, F_DUPFD_CLOEXEC, 0);
     if (free >= 0) close(free);
@@ -25,7 +25,8 @@ int lowest_free(int descriptor) noexcept {
 
 }  // namespace
 
-Listening::Listening(zmq::context_t& context, zmq::socket_t& socket, const std::string& endpoint) {
+ListeningSocket::ListeningSocket(zmq::context_t& context, zmq::socket_t& socket,
+                                 const std::string& endpoint) {
     zmq::socket_t monitor(context, zmq::socket_type::pair);
     monitor.set(zmq::sockopt::linger, 0);
     (void)zmq_socket_monitor(socket.handle(), kMonitor, ZMQ_EVENT_LISTENING);
@@ -48,7 +49,7 @@ Listening::Listening(zmq::context_t& context, zmq::socket_t& socket, const std::
     most_ = open + std::clamp((most - open) / 2, 0, kMostConnections);
 }
 
-void Listening::look() noexcept {
+void ListeningSocket::update() noexcept {
     if (descriptor_ < 0) return;
     const int free = lowest_free(descriptor_);
     const bool close = free < 0 || free >= most_;

@@ -1,3 +1,5 @@
+#include "simulated_processors.h"
+
 #include <algorithm>
 #include <cstdint>
 #include <deque>
@@ -8,14 +10,15 @@
 #include <string>
 #include <utility>
 
+#include "run/elapsed_time.h"
 #include "shared/coordinator.h"
 #include "shared/shared_world_worker.h"
-#include "sim/distributed_world.h"
 #include "sim/errors.h"
-#include "world/processor_time.h"
 
-namespace sim {
+namespace sim_bench {
 namespace {
+
+using namespace sim;
 
 using Bytes = std::shared_ptr<const std::vector<std::uint8_t>>;
 
@@ -24,12 +27,12 @@ struct Arrival {
     Bytes bytes;
 };
 
-/// What a worker does in one go. The same turns make the same of a worker, wherever it runs.
+/// What a worker does without a pause, in this order. The same turns bring any worker to the same state.
 struct Turn {
-    std::optional<SharedWorldWorker::Times> ended;  // the step under way ends
-    std::vector<Bytes> messages;
-    bool drain = false;
-    bool step = false;  // at last
+    std::optional<SharedWorldWorker::Times> ended;  // it ends the step under way
+    std::vector<Bytes> messages;                    // it receives these
+    bool drain = false;                             // it begins to leave
+    bool step = false;                              // it begins a step
 };
 
 double cost_of(const std::function<void()>& work) {
@@ -38,15 +41,15 @@ double cost_of(const std::function<void()>& work) {
     return thread_processor_s() - start;
 }
 
-// All but the step. The first message makes the worker.
+// Does all of a turn but the step. The first message creates the worker.
 void handle(std::unique_ptr<SharedWorldWorker>& worker, const Turn& turn) {
-    if (turn.ended) worker->worked(*turn.ended);
+    if (turn.ended) worker->end_step(*turn.ended);
     for (const Bytes& bytes : turn.messages) {
         DecodedMessage decoded = decode_message(*bytes);
         if (const auto* scene = std::get_if<SceneMessage>(&decoded.message)) {
             worker = std::make_unique<SharedWorldWorker>(*scene);
         } else if (worker) {
-            worker->take(decoded.header, std::move(decoded.message));
+            worker->receive(decoded.header, std::move(decoded.message));
         }
     }
     if (turn.drain && worker) worker->drain();
@@ -54,36 +57,36 @@ void handle(std::unique_ptr<SharedWorldWorker>& worker, const Turn& turn) {
 
 /// One worker and the processor it runs on.
 struct Processor {
-    std::unique_ptr<SharedWorldWorker> worker;  // with the scene
+    std::unique_ptr<SharedWorldWorker> worker;  // once it has received the scene
     std::deque<Arrival> inbox;                  // by ascending times
     std::deque<Arrival> outbox;                 // by times of sending
-    double free_at = 0;                         // when what it does now ends
+    double free_at = 0;                         // when its present work ends
     double handled = 0;                         // [s] spent on messages since its last step
     double waited = 0;                          // [s] idle since its last step
     bool stepping = false, drain = false;
     double step_cost = 0;  // [s] of the step under way
     bool killed = false, stopped = false, cut = false;
     double silent_since = 0;  // when one of these began
-    // Repeated alone:
+    // For repeat_alone:
     std::vector<Turn> turns;
-    double spent_s = 0;    // this thread's, once the worker was there
+    double spent_s = 0;    // processor time of this thread, once there was a worker
     std::size_t sent = 0;  // bytes
     [[nodiscard]] bool silent() const { return killed || stopped || cut; }
     [[nodiscard]] bool runs() const { return !killed && !stopped; }
 };
 
-// Everything happens in the order of simulated time; what happens at one time in the order: failures,
-// messages by the worker that sent them, workers by number.
+// Events happen in the order of simulated time. At one time failures come first, then silences, messages by
+// sender, and workers by number.
 class Machine {
 public:
     Machine(const WorldScene& scene, const DistributedSettings& settings, const SimulatedProcessors& how,
             DistributedObserver& observer)
-        : how_(how), meeting_(scene, settings, observer) {
+        : how_(how), coordinator_(scene, settings, observer) {
         std::stable_sort(how_.failures.begin(), how_.failures.end(),
                          [](const auto& a, const auto& b) { return a.time_s < b.time_s; });
     }
 
-    DistributedResult run();
+    SimulatedResult run();
 
 private:
     struct Event {
@@ -94,8 +97,8 @@ private:
 
     void join();
     void deliver();
-    void put(std::uint32_t to, double time, const Bytes& bytes);
-    void hand_on(std::size_t from);
+    void deliver_to(std::uint32_t to, double time, const Bytes& bytes);
+    void relay_next(std::size_t from);
     [[nodiscard]] Event next() const;
     void happen(const Event& event);
     void fail(const SimulatedProcessors::Failure& failure);
@@ -103,13 +106,13 @@ private:
     [[nodiscard]] Turn turn_of(Processor& p);
     void start_step(std::size_t number);
     [[nodiscard]] double repeat_alone(const Processor& p) const;
-    void repeat_alone(DistributedResult& result) const;
+    void repeat_alone(SimulatedResult& result) const;
     void send(Processor& p);
     [[nodiscard]] double factor(std::size_t number) const;
     [[nodiscard]] std::string stuck() const;
 
     SimulatedProcessors how_;
-    Coordinator meeting_;
+    Coordinator coordinator_;
     std::vector<Processor> processors_;
     std::size_t next_failure_ = 0;
     double now_ = 0, started_ = -1, ended_ = 0;
@@ -120,49 +123,50 @@ void Machine::join() {
     request.host = "a simulated processor";
     processors_.emplace_back();
     processors_.back().free_at = now_;
-    (void)meeting_.join(request);
+    (void)coordinator_.join(request);
 }
 
 void Machine::deliver() {
-    for (const Coordinator::Outgoing& message : meeting_.outgoing())
-        for (const std::uint32_t to : message.to) put(to, now_ + how_.latency_s / 2, message.bytes);
+    for (const Coordinator::Outgoing& message : coordinator_.outgoing())
+        for (const std::uint32_t to : message.to) deliver_to(to, now_ + how_.latency_s / 2, message.bytes);
 }
 
-void Machine::put(std::uint32_t to, double time, const Bytes& bytes) {
+void Machine::deliver_to(std::uint32_t to, double time, const Bytes& bytes) {
     Processor& p = processors_.at(to);
     if (p.cut || p.killed) return;
     const auto later = std::ranges::upper_bound(p.inbox, time, {}, &Arrival::time);
     p.inbox.insert(later, {time, bytes});
 }
 
-// The next of what a worker sent: a message leaves when its time has come, so that a cut before that keeps it.
-void Machine::hand_on(std::size_t from) {
+// Relays the next message of a worker. It leaves the worker when its time has come: a cut before that stops
+// it.
+void Machine::relay_next(std::size_t from) {
     const Arrival message = std::move(processors_[from].outbox.front());
     processors_[from].outbox.pop_front();
-    meeting_.take(static_cast<std::uint32_t>(from), *message.bytes);
-    meeting_.advance();
+    coordinator_.receive(static_cast<std::uint32_t>(from), *message.bytes);
+    coordinator_.advance();
 }
 
 Machine::Event Machine::next() const {
     Event best;
-    auto offer = [&best](Event::Kind kind, double time, std::size_t who) {
+    auto consider = [&best](Event::Kind kind, double time, std::size_t who) {
         if (best.kind == Event::Kind::none || std::pair(time, kind) < std::pair(best.time, best.kind))
             best = {kind, time, who};
     };
     if (next_failure_ < how_.failures.size())
-        offer(Event::Kind::failure, std::max(now_, how_.failures[next_failure_].time_s), 0);
+        consider(Event::Kind::failure, std::max(now_, how_.failures[next_failure_].time_s), 0);
     for (std::size_t i = 0; i < processors_.size(); ++i) {
         const Processor& p = processors_[i];
-        const auto& members = meeting_.members();
+        const auto& members = coordinator_.members();
         if (p.silent() && std::find(members.begin(), members.end(), i) != members.end())
-            offer(Event::Kind::silence, p.silent_since + how_.silence_s, i);
-        if (!p.outbox.empty()) offer(Event::Kind::message, p.outbox.front().time, i);
+            consider(Event::Kind::silence, p.silent_since + how_.silence_s, i);
+        if (!p.outbox.empty()) consider(Event::Kind::message, p.outbox.front().time, i);
         if (!p.runs()) continue;
         const bool startable = p.worker && p.worker->ready();
         if (p.stepping || (p.drain && p.worker) || startable) {
-            offer(Event::Kind::worker, p.free_at, i);
+            consider(Event::Kind::worker, p.free_at, i);
         } else if (!p.inbox.empty()) {
-            offer(Event::Kind::worker, std::max(p.free_at, p.inbox.front().time), i);
+            consider(Event::Kind::worker, std::max(p.free_at, p.inbox.front().time), i);
         }
     }
     return best;
@@ -172,11 +176,11 @@ void Machine::happen(const Event& event) {
     now_ = std::max(now_, event.time);
     if (event.kind == Event::Kind::failure) fail(how_.failures[next_failure_++]);
     if (event.kind == Event::Kind::silence)
-        meeting_.lose(static_cast<std::uint32_t>(event.who), "not heard of for a while");
-    if (event.kind == Event::Kind::message) hand_on(event.who);
+        coordinator_.lose(static_cast<std::uint32_t>(event.who), "silent for too long");
+    if (event.kind == Event::Kind::message) relay_next(event.who);
     if (event.kind == Event::Kind::worker) run_worker(event.who);
-    // If no worker is left, the application's own process continues.
-    if (meeting_.members().empty() && !meeting_.finished()) join();
+    // If no worker is left, the application goes on with a worker of its own.
+    if (coordinator_.members().empty() && !coordinator_.finished()) join();
     deliver();
 }
 
@@ -207,10 +211,10 @@ double Machine::factor(std::size_t number) const {
 void Machine::run_worker(std::size_t number) {
     Processor& p = processors_[number];
     Turn turn = turn_of(p);
-    const bool there = p.worker != nullptr;
+    const bool has_scene = p.worker != nullptr;
     const double spent = cost_of([&] { handle(p.worker, turn); });
-    if (there) p.spent_s += spent;
-    if (!how_.modelled && there) {  // that a worker reads its scene is no part of the run
+    if (has_scene) p.spent_s += spent;
+    if (!how_.modelled && has_scene) {  // reading the scene is no part of the run
         p.handled += spent * how_.slowdown;
         p.free_at = now_ + spent * how_.slowdown;
     }
@@ -257,25 +261,26 @@ void Machine::send(Processor& p) {
     }
 }
 
-// Processor time, as Processor::spent_s. Beside the worker that did it first: memory as of a process of its own.
+// The processor time of all turns of a processor, done by a new worker alone. The first worker still exists,
+// so the new one has memory of its own, as a process has.
 double Machine::repeat_alone(const Processor& p) const {
     std::unique_ptr<SharedWorldWorker> worker;
     double spent = 0;
     std::size_t sent = 0;
     for (const Turn& turn : p.turns) {
-        const bool there = worker != nullptr;
+        const bool has_scene = worker != nullptr;
         const double handled = cost_of([&] { handle(worker, turn); });
-        if (there) spent += handled;
+        if (has_scene) spent += handled;
         if (worker)
             for (const std::vector<std::uint8_t>& message : worker->outgoing()) sent += message.size();
         if (turn.step) spent += cost_of([&] { worker->step(); });
     }
     if (sent != p.sent)
-        throw std::logic_error("simulated processors: a worker did otherwise when it was alone");
+        throw std::logic_error("simulated processors: a worker sent other bytes when it was alone");
     return spent;
 }
 
-void Machine::repeat_alone(DistributedResult& result) const {
+void Machine::repeat_alone(SimulatedResult& result) const {
     double in_turns = 0, sum = 0, longest = 0;
     for (const Processor& p : processors_) {
         const double alone = repeat_alone(p);
@@ -286,10 +291,10 @@ void Machine::repeat_alone(DistributedResult& result) const {
     result.busiest_s = how_.slowdown * longest;
 }
 
-// That nothing is left to happen before the end is our own mistake.
+// Words for a run that has no event left before its end, which is our own mistake.
 std::string Machine::stuck() const {
     std::string what = "simulated processors: no event is left before the run's end; members";
-    for (const std::uint32_t worker : meeting_.members()) {
+    for (const std::uint32_t worker : coordinator_.members()) {
         const Processor& p = processors_[worker];
         what.append(" ").append(std::to_string(worker));
         if (p.worker)
@@ -302,16 +307,16 @@ std::string Machine::stuck() const {
     return what;
 }
 
-DistributedResult Machine::run() {
+SimulatedResult Machine::run() {
     for (int i = 0; i < how_.count; ++i) join();
-    meeting_.start();
+    coordinator_.start();
     deliver();
-    while (!meeting_.finished()) {
+    while (!coordinator_.finished()) {
         const Event event = next();
         if (event.kind == Event::Kind::none) throw std::logic_error(stuck());
         happen(event);
     }
-    DistributedResult result = meeting_.result();
+    SimulatedResult result{coordinator_.result()};
     result.elapsed_s = std::max(0.0, ended_ - std::max(0.0, started_));
     if (how_.repeat_alone) repeat_alone(result);
     return result;
@@ -319,10 +324,10 @@ DistributedResult Machine::run() {
 
 }  // namespace
 
-DistributedResult simulate_processors(const WorldScene& scene, const DistributedSettings& settings,
-                                      const SimulatedProcessors& processors, DistributedObserver& observer) {
+SimulatedResult simulate_processors(const WorldScene& scene, const DistributedSettings& settings,
+                                    const SimulatedProcessors& processors, DistributedObserver& observer) {
     if (processors.count < 1) throw InputError("", "no processor", "1 or more");
     return Machine(scene, settings, processors, observer).run();
 }
 
-}  // namespace sim
+}  // namespace sim_bench
