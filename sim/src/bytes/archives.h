@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <charconv>
 #include <iterator>
 #include <string_view>
@@ -9,6 +10,10 @@
 namespace sim {
 
 // The archives that fields() is called with, see fields.h.
+
+[[nodiscard]] std::size_t bytes_of(const IsMatrix auto& m) {
+    return sizeof m.coeff(0, 0) * static_cast<std::size_t>(m.size());
+}
 
 /// Adds up the bytes of fields whose lists and texts are empty; their values do not matter.
 class LeastBytes {
@@ -28,7 +33,7 @@ public:
         else if constexpr (kIsList<T>)
             bytes_ += sizeof(std::uint32_t);
         else if constexpr (IsMatrix<T>)
-            bytes_ += sizeof(typename T::Scalar) * static_cast<std::size_t>(value.size());
+            bytes_ += bytes_of(value);
         else
             fields(*this, value);
     }
@@ -63,8 +68,8 @@ public:
             out_.count(value.size());
             for (const auto& element : value) put(element);
         } else if constexpr (IsMatrix<T>) {
-            for (Eigen::Index j = 0; j < value.cols(); ++j)
-                for (Eigen::Index i = 0; i < value.rows(); ++i) out_.number(value.coeff(i, j));
+            const auto& whole = value.eval();  // in one piece, also of a block
+            out_.append({reinterpret_cast<const std::uint8_t*>(whole.data()), bytes_of(whole)});
         } else if constexpr (!std::is_empty_v<T>) {
             fields(*this, value);
         }
@@ -141,9 +146,13 @@ public:
             value.resize(count([](auto& archive, auto& element) { archive.add(element); }, value));
             for (auto& element : value) get(field, element);
         } else if constexpr (IsMatrix<T>) {
-            for (Eigen::Index j = 0; j < value.cols(); ++j)
-                for (Eigen::Index i = 0; i < value.rows(); ++i)
-                    value(i, j) = in_.number<typename T::Scalar>();
+            if constexpr (std::derived_from<T, Eigen::PlainObjectBase<T>>) {
+                std::ranges::copy(in_.take(bytes_of(value)), reinterpret_cast<std::uint8_t*>(value.data()));
+            } else {
+                typename T::PlainObject whole;
+                get(field, whole);
+                value = whole;
+            }
         } else if constexpr (!std::is_empty_v<T>) {
             fields(*this, value);
         }
