@@ -9,8 +9,8 @@
 
 namespace sim {
 
-// What travels is declared once, by a function that gives an archive all fields in order: their names, separated by blanks, and the
-// fields themselves, those with rules in wrappers:
+// What travels is declared once, by a function that gives an archive all fields in order: their names,
+// separated by blanks, and the fields themselves, those with rules in wrappers:
 //
 //   void fields(auto& archive, Is<Reach> auto& r) {
 //       archive("low high speed", finite(r.low), finite(r.high), Within{r.speed, 0, 1e9});
@@ -18,8 +18,9 @@ namespace sim {
 //
 // write_fields makes bytes of them. read_fields reads these, and throws DecodeError where a rule is broken.
 //
-// A number travels as it lies in memory, a bool as u8 of 0 or 1, a matrix column by column, a vector as u32 count and its elements,
-// anything else as its own fields; an empty struct has none. A count is at most what the bytes that are left can hold.
+// A number travels as it lies in memory, a bool as u8 of 0 or 1, a matrix column by column, a vector as u32
+// count and its elements, anything else as its own fields; an empty struct has none. A count is at most what
+// the bytes that are left can hold.
 
 template <typename T, typename Of>
 concept Is = std::same_as<std::remove_const_t<T>, Of>;
@@ -60,8 +61,8 @@ struct Text {
     std::uint32_t longest;  ///< [bytes]
     static constexpr std::size_t kLeastBytes = 4;
 };
-/// What a peer says of itself, which goes into reports and onto terminals. Written it is cut to `longest`; read it is printable ASCII,
-/// with a question mark for any other byte.
+/// What a peer says of itself, which goes into reports and onto terminals. Written it is cut to `longest`;
+/// read it is printable ASCII, with a question mark for any other byte.
 template <typename T>
 struct Words {
     T& value;

@@ -8,7 +8,8 @@
 
 namespace sim {
 
-// Messages between a play and the workers that simulate its struck bodies; their header is that of worker_messages.h.
+// Messages between a play and the workers that simulate its struck bodies; their header is that of
+// worker_messages.h.
 
 constexpr std::uint32_t kLongestStruckName = 1024, kMostStruckBodies = 1u << 20;
 

@@ -7,8 +7,8 @@
 #include <limits>
 #include <utility>
 
-#include "messages/world_record_codec.h"
 #include "body/body_kind.h"
+#include "messages/world_record_codec.h"
 
 namespace sim {
 namespace {
@@ -80,7 +80,8 @@ void read_halves(SmallReader& in, Vector& v) {
     for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = read_half(in);
 }
 
-// Small numbers of one kind: bytes, and the power of two by which they count: the least with which none is beyond 127.
+// Small numbers of one kind: bytes, and the power of two by which they count: the least with which none is
+// beyond 127.
 
 std::size_t bytes_of_small(std::size_t numbers) {
     return numbers > 0 ? 1 + numbers : 0;
@@ -303,7 +304,8 @@ void read(ByteReader& all, std::vector<CrossImpulse>& crossed) {
     crossed.resize(all.count(kCrossed));
     SmallReader in(all.take(kCrossed * crossed.size()));
     for (CrossImpulse& c : crossed) {
-        const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(), body = own & ~kRebound;
+        const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(),
+                   body = own & ~kRebound;
         const auto exponents = in.number<std::uint8_t>();
         if (body >= kMostWorldBodies || ghost >= kMostWorldBodies || body == ghost)
             throw DecodeError("an impulse between bodies that is none");

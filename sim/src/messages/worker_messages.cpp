@@ -11,7 +11,8 @@ namespace {
 constexpr std::array<std::uint8_t, 4> kMagic = {'M', 'W', 'S', 'W'};
 constexpr std::size_t kHeaderBytes = 28, kLengthAt = 8;
 
-/// The variant's alternative of index `type` - 1; what is there of that type is overwritten, so that its storage serves again.
+/// The variant's alternative of index `type` - 1; what is there of that type is overwritten, so that its
+/// storage serves again.
 template <std::size_t I = 0>
 void read_message(std::size_t type, ByteReader& in, WorkerMessage& into) {
     if constexpr (I < std::variant_size_v<WorkerMessage>) {

@@ -15,8 +15,9 @@
 
 namespace sim {
 
-// Messages between an application and its workers, and among workers: of a world that is simulated together, and of the struck bodies
-// of a play. One ZeroMQ frame each, little-endian, no padding: a header, then the fields that a message declares beside its struct.
+// Messages between an application and its workers, and among workers: of a world that is simulated together,
+// and of the struck bodies of a play. One ZeroMQ frame each, little-endian, no padding: a header, then the
+// fields that a message declares beside its struct.
 //
 //   offset  bytes
 //   0       4      "MWSW"
@@ -28,8 +29,8 @@ namespace sim {
 //   20      8      step: number of steps that the sender has done
 //   28      ...    the message's fields
 //
-// docs/formats.md lists all messages; a test makes that list from the declarations. Decoders check length, counts, flags, numbers, that
-// nothing is left over, and a scene as World would; else they throw DecodeError.
+// docs/formats.md lists all messages; a test makes that list from the declarations. Decoders check length,
+// counts, flags, numbers, that nothing is left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
 constexpr std::uint16_t kProtocol = 16;  ///< version, of messages and of how worlds step
@@ -153,7 +154,8 @@ struct Ownership {
     bool traded = false;                ///< to a buyer; else at the start, or after a loss
     std::uint64_t step = 0;
     std::vector<WorldRecord> bodies;  ///< exact; without a handover as last published
-    /// To the owner alone, which was not told of what is here before: others' bodies near these, as last published.
+    /// To the owner alone, which was not told of what is here before: others' bodies near these, as last
+    /// published.
     std::vector<WorldRecord> around = {};
     std::vector<std::uint64_t> around_step = {};  ///< of each
 };
@@ -204,8 +206,8 @@ void fields(auto& archive, Is<UpdateMessage> auto& m) {
 }
 
 constexpr double kFurthestReach = 1e8, kFastestReach = 1e9;  ///< from the origin [m]; [m/s]
-/// Where a worker's bodies are and go, see shared/nearness.h: a box around them [m], which is empty if it has none; of its two longest
-/// sides, each cut into 8, those of the 64 parts in which they are.
+/// Where a worker's bodies are and go, see shared/nearness.h: a box around them [m], which is empty if it has
+/// none; of its two longest sides, each cut into 8, those of the 64 parts in which they are.
 struct Reach {
     Eigen::AlignedBox3f box;
     std::uint64_t parts = 0;
@@ -221,8 +223,8 @@ void fields(Archive& archive, Is<Reach> auto& r) {
     if constexpr (Archive::kReads) r.box = {low, high};
 }
 
-/// After each step to each other worker: what the receiver needs of it. Bodies that it does not name are not near the
-/// receiver's, unless they sleep and it was told so.
+/// After each step to each other worker: what the receiver needs of it. Bodies that it does not name are not
+/// near the receiver's, unless they sleep and it was told so.
 struct NeighbourMessage {
     static constexpr const char* kRoute = "worker to worker";
     std::uint32_t to = 0;

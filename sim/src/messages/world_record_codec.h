@@ -5,8 +5,8 @@
 
 namespace sim {
 
-// Exact states of bodies. Of a broken one the numbers do not travel: zeros stand for them, and w = 1 for the orientation; the decoder
-// sets the position to NaN.
+// Exact states of bodies. Of a broken one the numbers do not travel: zeros stand for them, and w = 1 for the
+// orientation; the decoder sets the position to NaN.
 
 constexpr std::uint32_t kMostWorldBodies = 1u << 24;
 

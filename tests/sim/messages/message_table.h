@@ -27,7 +27,8 @@ std::string type_name() {
     return name.substr(name.rfind(':') + 1);
 }
 
-/// An archive that records what fields there are: "u32 to, number; list of OfferedBody bodies", and the structs among them.
+/// An archive that records what fields there are: "u32 to, number; list of OfferedBody bodies", and the
+/// structs among them.
 class FieldTable {
 public:
     static constexpr bool kReads = false, kWrites = false;
