@@ -80,7 +80,8 @@ void read_halves(SmallReader& in, Vector& v) {
     for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = read_half(in);
 }
 
-// Small numbers of one kind: bytes, and the power of two by which they count: the least with which none is beyond 127.
+// Small numbers of one kind: bytes, and the power of two by which they count: the least with which none is
+// beyond 127.
 
 std::size_t bytes_of_small(std::size_t numbers) {
     return numbers > 0 ? 1 + numbers : 0;
@@ -238,7 +239,7 @@ void write(ByteWriter& all, const Update& u) {
 }
 
 void read_update(ByteReader& all, Update& u) {
-    const BodyAndModes which = read_body_and_modes(all);
+    const BodyAndModes which = parted(all.number<std::uint32_t>());
     u.body = which.body;
     const auto flags = all.number<std::uint8_t>();
     const auto modes = static_cast<std::size_t>(which.modes);
@@ -294,13 +295,13 @@ void write(ByteWriter& out, const std::vector<CrossImpulse>& crossed) {
     }
 }
 
-void read_updates(ByteReader& in, std::vector<Update>& updates) {
+void read(ByteReader& in, std::vector<Update>& updates) {
     updates.resize(in.count(kSmallestUpdate));
     for (Update& u : updates) read_update(in, u);
 }
 
-std::vector<CrossImpulse> read_crossed(ByteReader& all) {
-    std::vector<CrossImpulse> crossed(all.count(kCrossed));
+void read(ByteReader& all, std::vector<CrossImpulse>& crossed) {
+    crossed.resize(all.count(kCrossed));
     SmallReader in(all.take(kCrossed * crossed.size()));
     for (CrossImpulse& c : crossed) {
         const auto own = in.number<std::uint32_t>(), ghost = in.number<std::uint32_t>(),
@@ -314,7 +315,6 @@ std::vector<CrossImpulse> read_crossed(ByteReader& all) {
                            read_angular(in, exponents >> 4, c.angular_ghost);
         if (!whole) throw DecodeError("an impulse that is broken");
     }
-    return crossed;
 }
 
 namespace {
@@ -357,6 +357,15 @@ void PackedUpdates::read(ByteReader& in) {
     }
     const auto used = all.first(all.size() - in.left());
     bytes_.assign(used.begin(), used.end());
+}
+
+void write(ByteWriter& out, const PackedUpdates& updates) {
+    out.count(updates.places().size());
+    out.append(updates.bytes());
+}
+
+void read(ByteReader& in, PackedUpdates& updates) {
+    updates.read(in);
 }
 
 void PackedUpdates::read(const Place& place, Update& into) const {

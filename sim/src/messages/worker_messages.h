@@ -5,84 +5,32 @@
 #include <variant>
 #include <vector>
 
-#include "bytes/byte_codec.h"
+#include "bytes/fields.h"
+#include "messages/market_messages.h"
 #include "messages/secret.h"
 #include "messages/struck_messages.h"
+#include "messages/update_codec.h"
 #include "sim/distributed_world.h"
 #include "world/shared_world.h"
 
 namespace sim {
 
-// Messages between applications and their workers, and among these: of a world that is simulated together, and of the struck bodies
-// of a play. One ZeroMQ frame each, little-endian, no padding.
+// Messages between an application and its workers, and among workers: of a world that is simulated together,
+// and of the struck bodies of a play. One ZeroMQ frame each, little-endian, no padding: a header, then the
+// fields that a message declares beside its struct.
 //
 //   offset  bytes
 //   0       4      "MWSW"
-//   4       2      version, 16
-//   6       2      type
+//   4       2      version
+//   6       2      type: place in WorkerMessage, from 1
 //   8       4      length of the whole message
 //   12      4      worker: sender; 0xffffffff the application
 //   16      4      epoch of ownership, as the sender knows it
 //   20      8      step: number of steps that the sender has done
-//   28      ...    body, by type
+//   28      ...    the message's fields
 //
-// f64, f32, f16 are IEEE numbers bit by bit, v3 = 3 f64, w3 = 3 f32, flag = u8 of 0 or 1, text = u32 length
-// and bytes, list = u32 count and the elements, b/m = u32: body below 2^24, and number of modes (at most
-// 128) times 2^24.
-//
-//    1 join       worker  16 bytes: its secret, text host
-//    2 beat       both    16 bytes: the worker's secret; zeros from the application
-//    3 drained    worker  nothing
-//    4 failure    worker  text
-//    5 scene      app     u32 worker, scene, settings
-//    6 refusal    app     text
-//    7 end        app     nothing
-//    8 members    app     list of u32, flag owners follow
-//    9 ownership  app     u32 owner, u32 from, flag traded, u64 step, list of record, list of record and of u64
-//                         (around, their steps)
-//   10 past       app     list of u32 (constraints that hold no more), list of {u32 body, u32 before, u64 step} (sales)
-//   11 state      worker  report, list of record
-//   12 update     worker  report, lists of update, u32 (constraints that broke)
-//   13 offer      worker  u32 to, u32 number, flag gathers, list of {u32 body, f32 seconds}
-//   14 answer     worker  u32 to, u32 number, flag accepted
-//   15 handover   worker  u32 to, u32 number, list of record
-//   16 to 18 of struck bodies, see struck_messages.h; of the others a play and its workers use 1, 2, 4, 6 and 7
-//   19 gather     app     u32 to, list of u32 (bodies)
-//   20 leaves     worker  nothing
-//   21 neighbour  worker  u8 (1 bodies, 2 crossed, 4 broken, 8 places), u32 to, u64 heard, f32 smoothed, u32 own,
-//                         w3 low, w3 high, u64 parts, f32 speed; lists, if they are there, of update, crossed,
-//                         u32 (constraints that broke), place
-//   22 found      worker  u32 to, u32 epoch, list of {u64 step, list of crossed}
-//
-//   report      60 bytes and its mishaps: f32 seconds, smoothed, waited, processor; u32 lead, ghost age,
-//               cross contacts, own; v3 outside impulse; list of {u8 kind, u32 number, u64 step, text}
-//   record      115 + 16 m bytes, 307 with 12 modes: b/m, u8 (1 asleep, 2 quarantined, 4 at limit, 8 broken),
-//               u16 still steps, i32 sleep group, v3 position, f64 orientation w x y z, v3 velocity,
-//               v3 angular momentum, f64 q[m], f64 q'[m]
-//   update      37 + 3 m bytes, 73 with 12 modes, 36 with none; if held, 13 + m more, 98 in all:
-//               b/m, u8 (1 asleep, 2 still, 4 quarantined, 8 held, and 16 times E), w3 position,
-//               7 bytes orientation, 3 f16 velocity, 3 i16 angular momentum in units of
-//               2^(4 E - 44) kg m^2/s, f16 q[m], small q'[m]; held: 3 f16 linear, 3 f16 angular, small modal[m]
-//   small       of n numbers, if there are any: i8 E, n i8 in units of 2^E, E the least with which none is beyond 127
-//   place       16 bytes: u32 body, w3 position
-//   crossed     33 bytes: u32 own (+ 2^31: blow), u32 other, u8 E of the first and 16 times E of the second, w3 linear on own,
-//               3 i16 angular on own, 3 i16 angular on other, in units of 2^(4 E - 44) kg m^2/s
-//   scene, settings: see world_scene_codec.cpp
-//
-// The 7 bytes of an orientation: 56 bits, lowest first: which of x, y, z, w is largest in size (2 bits; it is
-// made positive and follows from the others), the other three in that order, each 18 bits, 0 to 2^18 - 1 for
-// -1/sqrt 2 to 1/sqrt 2.
-//
-// Largest quantisation errors of an update: position 2^-24 of each coordinate; orientation 1.9e-5 rad;
-// angular momentum 1/4095 of its largest coordinate (plus 2^-45 kg m^2/s; range 2.1e9); f16 2^-11 of each
-// number (plus 3e-8; range 65504); small 1/127 of the largest (plus 2^-129).
-//
-// A state that is not finite or beyond 1e7 m or 1e6 m/s is broken; World takes the body out at the next
-// step. Its numbers do not travel: zeros stand for them (and w = 1 for the orientation; in an update the
-// angular momentum is -32768 three times), and the decoder sets the position to NaN.
-//
-// Decoders check length, counts, flags, that every number is finite and in range, that nothing is
-// left over, and a scene as World would; else they throw DecodeError.
+// docs/formats.md lists all messages; a test makes that list from the declarations. Decoders check length,
+// counts, flags, numbers, that nothing is left over, and a scene as World would; else they throw DecodeError.
 
 constexpr std::uint32_t kApplication = 0xffffffff;
 constexpr std::uint16_t kProtocol = 16;  ///< version, of messages and of how worlds step
@@ -100,6 +48,12 @@ struct Mishap {
     std::uint64_t step = 0;
     std::string what;  ///< quarantined: which value
 };
+void fields(auto& archive, Is<Mishap> auto& m) {
+    archive("kind number step what", Choice{m.kind, Mishap::Kind::broken}, m.number, m.step,
+            Words{m.what, 64});
+}
+
+constexpr std::uint32_t kLongestText = 4096;
 
 /// A worker's report of its last step, in every state and update message.
 struct StepReport {
@@ -109,135 +63,178 @@ struct StepReport {
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< since this worker's start
     std::vector<Mishap> mishaps;                                ///< of the step
 };
+void fields(auto& archive, Is<StepReport> auto& r) {
+    const auto time = [](auto& seconds) { return Within{seconds, 0, kLongestTime_s}; };
+    archive("seconds smoothed_s waited_s processor_s", time(r.seconds), time(r.smoothed_s), time(r.waited_s),
+            time(r.processor_s));
+    archive("lead ghost_age cross_contacts own", r.lead, r.ghost_age, r.cross_contacts, r.own);
+    archive("outside_impulse mishaps", finite(r.outside_impulse), r.mishaps);
+}
 
-// Worker to application.
 struct JoinRequest {
+    static constexpr const char* kRoute = "worker to application";
     Secret secret = {};
     std::string host;  ///< printable ASCII, whatever was sent; at most 255 characters
 };
-struct Beat {  ///< both ways, every 0.1 s
-    Secret secret = {};
+void fields(auto& archive, Is<JoinRequest> auto& m) {
+    archive("secret host", m.secret, Words{m.host, 255});
+}
+
+struct Beat {  ///< every 0.1 s
+    static constexpr const char* kRoute = "worker to application, and back";
+    Secret secret = {};  ///< the worker's; zeros from the application
 };
-struct Drained {};      ///< worker: has given away all it owned and leaves
-struct Leaves {};       ///< worker: wants to; gets a Gather for all it owns
-struct WorkerFailure {  ///< worker: cannot go on
+void fields(auto& archive, Is<Beat> auto& m) {
+    archive("secret", m.secret);
+}
+
+struct Drained {  ///< has given away all it owned and leaves
+    static constexpr const char* kRoute = "worker to application";
+};
+struct Leaves {  ///< wants to leave; gets a Gather for all it owns
+    static constexpr const char* kRoute = "worker to application";
+};
+
+struct WorkerFailure {  ///< cannot go on
+    static constexpr const char* kRoute = "worker to application";
     std::string what;
 };
-
-// Application to one worker.
+void fields(auto& archive, Is<WorkerFailure> auto& m) {
+    archive("what", Words{m.what, kLongestText});
+}
 
 struct SceneMessage {
+    static constexpr const char* kRoute = "application to one worker";
     std::uint32_t worker = 0;  ///< number of the joining worker
     WorldScene scene;
     DistributedSettings settings;
 };
+void fields(auto& archive, Is<SceneMessage> auto& m) {
+    archive("worker scene settings", m.worker, m.scene, m.settings);
+}
+
 struct Refusal {  ///< of a join; or the worker was given up
+    static constexpr const char* kRoute = "application to one worker";
     std::string why;
 };
-struct EndOfRun {};
+void fields(auto& archive, Is<Refusal> auto& m) {
+    archive("why", Words{m.why, kLongestText});
+}
 
-// Application to all workers.
+struct EndOfRun {
+    static constexpr const char* kRoute = "application to all workers";
+};
+
 struct Members {
+    static constexpr const char* kRoute = "application to all workers";
     std::vector<std::uint32_t> workers;
     /// Owners of some bodies are told next, then this message comes again without the flag. Until then nobody
     /// steps.
     bool owners_follow = false;
 };
+void fields(auto& archive, Is<Members> auto& m) {
+    archive("workers owners_follow", m.workers, m.owners_follow);
+}
+
 /// Impulses at the contacts of own bodies with others' that a worker found in a step.
 struct FoundStep {
     std::uint64_t step = 0;
     std::vector<CrossImpulse> crossed;  ///< as floats; ascending by (own, ghost)
 };
+void fields(auto& archive, Is<FoundStep> auto& m) {
+    archive("step crossed", m.step, Packed{m.crossed});
+}
+
 /// Registered ownership: `owner` steps these bodies from the end of step `step` on. The header's epoch is the
 /// new one.
 struct Ownership {
+    static constexpr const char* kRoute = "application to all workers";
     std::uint32_t owner = 0;
     std::uint32_t from = kApplication;  ///< the owner before; kApplication: none
     bool traded = false;                ///< to a buyer; else at the start, or after a loss
     std::uint64_t step = 0;
     std::vector<WorldRecord> bodies;  ///< exact; without a handover as last published
-    /// To the owner alone, which was not told of what is here before: others' bodies near these, as last published.
+    /// To the owner alone, which was not told of what is here before: others' bodies near these, as last
+    /// published.
     std::vector<WorldRecord> around = {};
     std::vector<std::uint64_t> around_step = {};  ///< of each
 };
+void fields(auto& archive, Is<Ownership> auto& m) {
+    archive("owner from traded step", m.owner, m.from, m.traded, m.step);
+    archive("bodies around around_step", m.bodies, m.around, m.around_step);
+    archive.check(m.around.size() == m.around_step.size(), "bodies around without their steps");
+}
+
 /// A body had another owner up to the end of a step.
 struct PastSale {
     std::uint32_t body, before;
     std::uint64_t step;
 };
+void fields(auto& archive, Is<PastSale> auto& s) {
+    archive("body before step", s.body, s.before, s.step);
+}
+
 /// For a worker that joins late: what has been up to the header's step, which all have done.
 struct PastMessage {
+    static constexpr const char* kRoute = "application to one worker";
     std::vector<std::uint32_t> broken;  ///< constraints that hold no more
     std::vector<PastSale> sales;        ///< of the steps that are still compared; of each body ascending
 };
-
-// Worker to the application after each step.
+void fields(auto& archive, Is<PastMessage> auto& m) {
+    archive("broken sales", m.broken, m.sales);
+}
 
 /// Own bodies once more after the last step, exact, as what came late has put them right.
 struct StateMessage {
+    static constexpr const char* kRoute = "worker to application";
     StepReport report;
     std::vector<WorldRecord> bodies;
 };
+void fields(auto& archive, Is<StateMessage> auto& m) {
+    archive("report bodies", m.report, m.bodies);
+}
 
-/// One body's state, quantised: at most 98 bytes with 12 modes.
-struct Update {
-    std::uint32_t body = 0;
-    bool asleep = false, still = false, quarantined = false;
-    WorldBodyState state;
-    bool held = false;    ///< whether `impulse` is there
-    StepImpulse impulse;  ///< from the owner's other bodies, the mean of a step; linear, angular, modal
-};
-struct UpdateMessage {  ///< all that the step made of own bodies
+/// After each step: all that it made of own bodies.
+struct UpdateMessage {
+    static constexpr const char* kRoute = "worker to application";
     StepReport report;
     std::vector<Update> bodies;         ///< own, ascending
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
 };
+void fields(auto& archive, Is<UpdateMessage> auto& m) {
+    archive("report bodies broken", m.report, Packed{m.bodies}, m.broken);
+}
 
-/// Updates as bytes: of those that one worker tells another few are needed soon, and those are read then.
-class PackedUpdates {
-public:
-    struct Place {
-        std::uint32_t body, offset;
-        Eigen::Index modes;
-        bool asleep, quarantined;
-        Eigen::Vector3d position, velocity;  ///< [m], [m/s]
-    };
-    [[nodiscard]] const std::vector<Place>& places() const noexcept { return places_; }
-    [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept { return bytes_; }
-    void clear() { bytes_.clear(), places_.clear(); }
-    void add(const Update& update);
-    /// One of other packed updates.
-    void add(const PackedUpdates& from, const Place& place);
-    /// Those that follow there; each is read once. Throws DecodeError.
-    void read(ByteReader& in);
-    void read(const Place& place, Update& into) const;
-
-private:
-    std::vector<std::uint8_t> bytes_;
-    std::vector<Place> places_;
-};
-
-// Worker to worker, through the application, which passes them on in the order in which they came.
-
-constexpr double kFurthestReach = 1e8;  ///< of a reach, from the origin [m]
-/// Where a worker's bodies are and go, see shared/nearness.h: a box around them [m], which is empty if it has none; of its two longest
-/// sides, each cut into 8, those of the 64 parts in which they are.
+constexpr double kFurthestReach = 1e8, kFastestReach = 1e9;  ///< from the origin [m]; [m/s]
+/// Where a worker's bodies are and go, see shared/nearness.h: a box around them [m], which is empty if it has
+/// none; of its two longest sides, each cut into 8, those of the 64 parts in which they are.
 struct Reach {
     Eigen::AlignedBox3f box;
     std::uint64_t parts = 0;
     float speed = 0;  ///< of the fastest [m/s]
 };
-/// After each step to each other worker: what the receiver needs of it. Bodies that it does not name are not near the
-/// receiver's, unless they sleep and it was told so.
+template <typename Archive>
+void fields(Archive& archive, Is<Reach> auto& r) {
+    Eigen::Vector3f low = r.box.min(), high = r.box.max();
+    if (r.box.isEmpty()) low.setOnes(), high.setZero();
+    archive("low high", Within{low, -kFurthestReach, kFurthestReach},
+            Within{high, -kFurthestReach, kFurthestReach});
+    archive("parts speed", r.parts, Within{r.speed, 0, kFastestReach});
+    if constexpr (Archive::kReads) r.box = {low, high};
+}
+
+/// After each step to each other worker: what the receiver needs of it. Bodies that it does not name are not
+/// near the receiver's, unless they sleep and it was told so.
 struct NeighbourMessage {
+    static constexpr const char* kRoute = "worker to worker";
     std::uint32_t to = 0;
     std::uint64_t heard = 0;  ///< step of the receiver's last message that the sender has heard
     float smoothed_s = 0;     ///< see WorkerStep
     std::uint32_t own = 0;    ///< number of the sender's bodies
     Reach reach;              ///< of these
     PackedUpdates bodies;     ///< ascending
-    std::vector<CrossImpulse>
-        crossed;  ///< of own bodies with the receiver's in the last step, as floats; ascending
+    /// Of own bodies with the receiver's in the last step, as floats; ascending.
+    std::vector<CrossImpulse> crossed;
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
     struct Place {
         std::uint32_t body = 0;
@@ -246,37 +243,36 @@ struct NeighbourMessage {
     std::vector<Place> places;  ///< of all own bodies, every kPlacesEvery steps, for load balancing
 };
 constexpr std::uint64_t kPlacesEvery = 32;
+void fields(auto& archive, Is<NeighbourMessage::Place> auto& p) {
+    archive("body position", p.body, finite(p.position));
+}
+template <typename Archive>
+void fields(Archive& archive, Is<NeighbourMessage> auto& m) {
+    bool bodies = !m.bodies.places().empty(), crossed = !m.crossed.empty(), broken = !m.broken.empty(),
+         places = !m.places.empty();
+    archive("bodies,crossed,broken,places", Bits{bodies, crossed, broken, places});  // which lists follow
+    archive("to heard smoothed_s own reach", m.to, m.heard, Within{m.smoothed_s, 0, kLongestTime_s}, m.own,
+            m.reach);
+    if constexpr (Archive::kReads) m.bodies.clear(), m.crossed.clear(), m.broken.clear(), m.places.clear();
+    if (bodies) archive("bodies", Packed{m.bodies});
+    if (crossed) archive("crossed", Packed{m.crossed});
+    if (broken) archive("broken", m.broken);
+    if (places) archive("places", m.places);
+    archive.check(bodies != m.bodies.places().empty() && crossed != m.crossed.empty() &&
+                      broken != m.broken.empty() && places != m.places.empty(),
+                  "an empty list");
+}
+
 /// To who has just got bodies: what the sender found at them in the last steps.
 struct FoundMessage {
+    static constexpr const char* kRoute = "worker to worker";
     std::uint32_t to = 0;
     std::uint32_t epoch = 0;  ///< in which they changed owners
     std::vector<FoundStep> steps;
 };
-
-// Likewise, of the market.
-struct Offer {
-    std::uint32_t to = 0, number = 0;  ///< number: of the seller's offers
-    std::vector<std::uint32_t> bodies;
-    std::vector<float> cost_s;  ///< of each, at the seller
-    bool gathers = false;       ///< as the application asked, see Gather: whatever it costs
-};
-struct OfferAnswer {
-    std::uint32_t to = 0, number = 0;
-    bool accepted = false;
-};
-/// To the application, which registers it or gives the bodies back: exact states at the end of the header's
-/// step.
-struct Handover {
-    std::uint32_t to = 0, number = 0;
-    std::vector<WorldRecord> bodies;
-};
-
-/// From the application: these bodies belong to a structure (shared/structures.h) of which another worker has
-/// most, or their owner leaves: it offers them to that one. To the application: there is no other, it hands over what it has.
-struct Gather {
-    std::uint32_t to = 0;
-    std::vector<std::uint32_t> bodies;
-};
+void fields(auto& archive, Is<FoundMessage> auto& m) {
+    archive("to epoch steps", m.to, m.epoch, m.steps);
+}
 
 using WorkerMessage =
     std::variant<JoinRequest, Beat, Drained, WorkerFailure, SceneMessage, Refusal, EndOfRun, Members,

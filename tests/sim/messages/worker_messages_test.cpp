@@ -199,7 +199,7 @@ TEST(WorkerMessages, AnExactRecordWithTwelveModesIs307Bytes) {
     EXPECT_EQ(size_of(one) - size_of(sim::StateMessage{}), 307u);
 }
 
-// The bounds that worker_messages.h states.
+// The bounds that update_codec.h states.
 TEST(WorkerMessages, TenThousandUpdatesComeBackWithinTheStatedErrors) {
     Rng rng(2);
     const auto half_bound = [](double x) { return std::abs(x) / 2048 + 3e-8; };
