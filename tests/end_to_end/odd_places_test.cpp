@@ -360,7 +360,8 @@ TEST(OddPlaces, TooFewDescriptorsAreSaidAndNotDiedOf) {
 TEST(OddPlaces, AHangUpEndsARunInOrder) {
     const Folder folder;
     const std::string start =
-        "TMPDIR=" + (folder / ".").string() + " " + kProgram +
+        // Whoever runs the tests may ignore hang-ups (nohup), and their children then do, too.
+        "env --default-signal=HUP TMPDIR=" + (folder / ".").string() + " " + kProgram +
         " latency flourish --no-frames --seconds 600 & program=$!; "
         "until ls -d '" +
         (folder / ".").string() +

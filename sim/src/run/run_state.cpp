@@ -10,7 +10,7 @@
 namespace sim {
 namespace {
 
-//   u64 step; lists of record (worker_messages.h), of contact and of spring; v3 outside impulse
+//   u64 step; lists of record (world_record_codec.h), of contact and of spring; v3 outside impulse
 //   f64 elapsed s, cpu s
 //   i32 contacts, pairs, islands, asleep; u64 inverse fallbacks, deformations limited, constraints broken, impacts,
 //   solved again, held apart

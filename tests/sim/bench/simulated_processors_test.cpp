@@ -37,7 +37,7 @@ TEST(SimulatedProcessors, ThatRepeatTheirWorkAloneLeaveTheBitsAlsoThroughDrainsJ
     }
 }
 
-// What they publish in between is rounded (worker_messages.h).
+// What they publish in between is rounded (update_codec.h).
 TEST(SimulatedProcessors, OutOfStepTheLastStatesAreExact) {
     sim::WorldScene scene;
     for (int i = 0; i < 9; ++i) {  // touch nothing
