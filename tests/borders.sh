@@ -19,7 +19,7 @@ while IFS=: read -r pattern folder; do
     [ -n "$found" ] && complain "$pattern belongs to $folder alone: $found"
 done <<'LIST'
 GL/|assimp/|spng:render
-isa-l/:render|sim
+isa-l/:render
 csound|sndfile:audio
 bson/|fpzip:tracking
 Spectra/:sim

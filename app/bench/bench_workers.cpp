@@ -99,21 +99,21 @@ public:
         const auto elapsed = [&](const Way& way) { return measure(scene, workers, way).result.elapsed_s; };
         const auto compare = [&](const std::string& name, const Factor& factor, int bound) {
             progress_("stragglers: " + name);
-            const double barrier = elapsed({0, false, factor}), async = elapsed({bound, false, factor});
+            const double barrier = elapsed({0, false, factor}), bounded = elapsed({bound, false, factor});
             add(name + "_barrier_elapsed", barrier, "s");
-            add(name + "_async_elapsed", async, "s");
-            add(name + "_async_over_barrier", barrier / async, "times as fast");
+            add(name + "_bounded_elapsed", bounded, "s");
+            add(name + "_bounded_over_barrier", barrier / bounded, "times as fast");
             return barrier;
         };
         const double barrier = compare("straggler_permanent_unbalanced", permanent, options_.bound);
         progress_("stragglers: permanent, balanced");
         const double balanced = elapsed({options_.bound, true, permanent}),
                      balanced_barrier = elapsed({0, true, permanent});
-        const std::string async_name = "straggler_permanent_async_balanced_",
+        const std::string bounded_name = "straggler_permanent_bounded_balanced_",
                           barrier_name = "straggler_permanent_barrier_balanced_";
-        add(async_name + "elapsed", balanced, "s");
+        add(bounded_name + "elapsed", balanced, "s");
         add(barrier_name + "elapsed", balanced_barrier, "s");
-        add(async_name + "over_barrier", barrier / balanced, "times as fast");
+        add(bounded_name + "over_barrier", barrier / balanced, "times as fast");
         add(barrier_name + "over_barrier", barrier / balanced_barrier, "times as fast");
         std::vector<double> gains{barrier / balanced};
         for (int slow = 1; slow < workers; ++slow) {  // what they have at first differs
@@ -122,7 +122,7 @@ public:
             gains.push_back(elapsed({0, false, half}) / elapsed({options_.bound, true, half}));
         }
         std::ranges::sort(gains);
-        const std::string each_name = "straggler_permanent_each_async_balanced_over_barrier_";
+        const std::string each_name = "straggler_permanent_each_bounded_balanced_over_barrier_";
         add(each_name + "median", quantile(gains, 0.5), "times as fast");
         add(each_name + "least", gains.front(), "times as fast");
         add(each_name + "most", gains.back(), "times as fast");
@@ -208,7 +208,8 @@ public:
             "processes: {} steps, medians of {} runs in turns, times one process without workers; at most "
             "{} workers, this machine's cores, which the application shares. Critical path: by "
             "processor time of the workers' stepping threads, with their messages, if each step waited for "
-            "all others' step before it (async: for the one before that). async: with the bound; barrier: "
+            "all others' step before it (bounded: for the one before that). bounded: with the bound; "
+            "barrier: "
             "with a bound of 0.",
             options_.steps, options_.rounds, cores()));
     }
@@ -218,7 +219,7 @@ public:
         note(fmt::format(
             "Clock of speedup, stragglers, bound and migration: simulated processors; costs {}, {} times "
             "slower than here; {:g} s from worker to worker; events in simulated order in one thread. {} "
-            "steps, async at most {} ahead.",
+            "steps, bounded at most {} ahead.",
             p.modelled ? "counted, not measured" : "this thread's processor time", p.slowdown, p.latency_s,
             options_.steps, options_.bound));
     }
@@ -256,14 +257,15 @@ private:
             progress_(fmt::format("speed-up: {} bodies, {} workers", bodies, workers));
             SpeedUp::Row row{workers, alone, alone};
             if (workers > 1) {
-                const SharedRun async = measure(scene, workers, {options_.bound, true, {}, true});
-                row.async = run_of(async);
+                const SharedRun bounded = measure(scene, workers, {options_.bound, true, {}, true});
+                row.bounded = run_of(bounded);
                 row.barrier = run_of(measure(scene, workers, {0, true, {}, true}));
-                row.bytes = double(async.result.bytes) / double(std::max<std::uint64_t>(1, async.body_steps));
+                row.bytes =
+                    double(bounded.result.bytes) / double(std::max<std::uint64_t>(1, bounded.body_steps));
             }
             speed_up.rows.push_back(row);
             const std::string name = fmt::format("bodies{}_workers{}_", bodies, workers);
-            for (const auto& [pace, run] : {std::pair("async", row.async), {"barrier", row.barrier}}) {
+            for (const auto& [pace, run] : {std::pair("bounded", row.bounded), {"barrier", row.barrier}}) {
                 add(name + pace + "_elapsed", run.elapsed_s, "s");
                 add(name + pace + "_speed_up", alone.elapsed_s / run.elapsed_s, "times one");
                 if (run.busiest_s > 0)
@@ -305,7 +307,7 @@ private:
                     if (workers > cores()) continue;
                     sim::DistributedLaunch launch;
                     launch.processes = {options_.program, {"worker"}, workers};
-                    take(fmt::format("{}workers{}_{}", prefix, workers, bound > 0 ? "async" : "barrier"),
+                    take(fmt::format("{}workers{}_{}", prefix, workers, bound > 0 ? "bounded" : "barrier"),
                          sim_bench::measure_run(scene, settings_of(options_.steps, bound, true), launch),
                          std::min(bound, 1));
                 }
@@ -353,7 +355,7 @@ std::string panel(const SpeedUp& s, const Shown& of) {
                                       dash, colour, title));
     };
     add("#8c8c8c", "ideal", 1, [&](const SpeedUp::Row& row) { return s.alone_s / row.workers; });
-    add("#2468b4", "asynchronous", 1, [](const SpeedUp::Row& row) { return row.async.elapsed_s; });
+    add("#2468b4", "asynchronous", 1, [](const SpeedUp::Row& row) { return row.bounded.elapsed_s; });
     add("#e03131", "barrier", 2, [](const SpeedUp::Row& row) { return row.barrier.elapsed_s; });
     return panel.text();
 }
@@ -375,12 +377,12 @@ Table table_of(std::span<const SpeedUp> speed_ups) {
             table.add_figures({{"bodies:d", s.bodies},
                                {"workers:d", r.workers},
                                {"ideal_s:.3g", s.alone_s / r.workers},
-                               {"async_s:.3g", r.async.elapsed_s},
+                               {"bounded_s:.3g", r.bounded.elapsed_s},
                                {"barrier_s:.3g", r.barrier.elapsed_s},
                                {"bytes_per_body_step:.0f", r.bytes},
-                               {"async_speed_up:.2f", s.alone_s / r.async.elapsed_s, false},
+                               {"bounded_speed_up:.2f", s.alone_s / r.bounded.elapsed_s, false},
                                {"barrier_speed_up:.2f", s.alone_s / r.barrier.elapsed_s, false},
-                               {"async_cold_caches:.2f", r.async.cold_caches, false},
+                               {"bounded_cold_caches:.2f", r.bounded.cold_caches, false},
                                {"barrier_cold_caches:.2f", r.barrier.cold_caches, false}});
     return table;
 }
@@ -413,8 +415,8 @@ Figures figures_of(const WorkersBench& bench) {
     for (const SpeedUp& s : bench.speed_ups) {
         text += fmt::format("{} bodies: {:.3g} s on one processor\n{}\n", s.bodies, s.alone_s,
                             table_of(std::span(&s, 1))
-                                .part({"workers", "async_speed_up", "barrier_speed_up", "async_cold_caches",
-                                       "barrier_cold_caches", "bytes_per_body_step"})
+                                .part({"workers", "bounded_speed_up", "barrier_speed_up",
+                                       "bounded_cold_caches", "barrier_cold_caches", "bytes_per_body_step"})
                                 .text());
         figures.plots[fmt::format("speed_up/bodies{}.svg", s.bodies)] = speed_up_plot(s);
     }

@@ -23,8 +23,8 @@ struct SpeedUp {
     };
     struct Row {
         int workers = 1;
-        Run async, barrier;  ///< with the bound that was asked for, with a bound of 0
-        double bytes = 0;    ///< a body's step, of async
+        Run bounded, barrier;  ///< with the bound that was asked for, with a bound of 0
+        double bytes = 0;      ///< a body's step, of the bounded run
     };
     int bodies = 0;
     double alone_s = 0;  ///< one processor

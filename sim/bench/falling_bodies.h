@@ -7,7 +7,6 @@ namespace sim_bench {
 /// number.
 constexpr double kBallRadius_m = 0.5;
 constexpr int kBallTriangles = 360;  ///< 182 vertices
-constexpr int kBenchmarkSteps = 500;
 
 /// `count` balls of 1000 kg/m^3 with `modes` modes (0: rigid); twelve swing at 9 to 13 Hz, slow enough for
 /// explicit integrators at 1/60 s, too. They start at rest in layers 1.3 m apart, 1.15 m from each other,

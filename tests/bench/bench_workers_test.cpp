@@ -64,15 +64,16 @@ TEST(BenchWorkers, TwentyFiveBallsOnTwoProcessorsGiveEveryFigureOfEveryPart) {
     options.only = {"speedup", "stragglers", "bound", "migration"};
     const WorkersBench bench = bench_workers(options, [](const std::string&) {});
     std::map<std::string, double> figures = figures_by_name(bench);
-    EXPECT_EQ(figures.at("bodies25_workers1_async_speed_up"), 1);
-    EXPECT_LE(figures.at("bodies25_workers2_async_speed_up"), 2);  // costs are counted: as many as there are
-    EXPECT_EQ(figures.at("bodies25_workers2_async_cold_caches"), 1);
+    EXPECT_EQ(figures.at("bodies25_workers1_bounded_speed_up"), 1);
+    EXPECT_LE(figures.at("bodies25_workers2_bounded_speed_up"),
+              2);  // costs are counted: as many as there are
+    EXPECT_EQ(figures.at("bodies25_workers2_bounded_cold_caches"), 1);
     for (const char* name :
-         {"bodies25_workers2_async_speed_up", "bodies25_workers2_bytes_per_body_step",
-          "bodies25_workers2_barrier_speed_up", "straggler_permanent_async_balanced_over_barrier",
-          "straggler_unsteady_b4_async_over_barrier",
-          "straggler_permanent_each_async_balanced_over_barrier_least",
-          "straggler_wandering_b16_async_over_barrier", "bound16_height_at_end", "migration_bodies_traded"})
+         {"bodies25_workers2_bounded_speed_up", "bodies25_workers2_bytes_per_body_step",
+          "bodies25_workers2_barrier_speed_up", "straggler_permanent_bounded_balanced_over_barrier",
+          "straggler_unsteady_b4_bounded_over_barrier",
+          "straggler_permanent_each_bounded_balanced_over_barrier_least",
+          "straggler_wandering_b16_bounded_over_barrier", "bound16_height_at_end", "migration_bodies_traded"})
         EXPECT_GT(figures[name], 0) << name;
     EXPECT_EQ(bench.bounds.size(), 7u);
     EXPECT_EQ(bench.migration.workers().size(), 3u);
@@ -90,7 +91,7 @@ TEST(BenchWorkers, OnThisMachineRunsOfProcessesHaveAWallClockAndACriticalPath) {
     options.only = {"threads", "processes"};
     std::map<std::string, double> figures =
         figures_by_name(bench_workers(options, [](const std::string&) {}));
-    for (const std::string name : {"processes_bodies9_alone", "processes_bodies9_workers1_async",
+    for (const std::string name : {"processes_bodies9_alone", "processes_bodies9_workers1_bounded",
                                    "processes_bodies9_workers1_barrier"})
         for (const char* what : {"_elapsed", "_critical_path", "_speed_up", "_critical_path_speed_up"})
             EXPECT_GT(figures[name + what], 0) << name << what;

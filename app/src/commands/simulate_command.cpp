@@ -137,7 +137,7 @@ std::shared_ptr<Options> declare_simulation(Command& command) {
     return o;
 }
 
-/// Of a run that goes on: how it is done and told may be another than it was, what comes out may not.
+/// Of a run that goes on: how it is done and shown may be another than it was, what comes out may not.
 bool may_change(const std::string& name) {
     constexpr std::array<std::string_view, 4> kHow = {"--checkpoint", "--threads", "--json",
                                                       "--allow-quarantine"};

@@ -15,7 +15,7 @@ struct RecordState {
     std::array<std::uint64_t, 3> table_bytes{};  ///< of states.csv, energy.csv, times.csv
     std::uint64_t next_frame = 0, body_steps = 0;
     MomentumWatch::Largest momentum;
-    std::vector<std::pair<int, std::uint64_t>> spun;  ///< bodies, and the step that was told
+    std::vector<std::pair<int, std::uint64_t>> spun;  ///< bodies, and the step that was reported
     double wall_s = 0;
 };
 

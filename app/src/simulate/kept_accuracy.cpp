@@ -11,7 +11,7 @@
 namespace app {
 namespace {
 
-constexpr std::size_t kMostBodies = 8;  // that are told of
+constexpr std::size_t kMostBodies = 8;  // that are named
 using Json = nlohmann::ordered_json;
 
 std::string parts_of(const sim::BodyError& e) {

@@ -226,14 +226,14 @@ RecordState SimulateRecord::save_record() {
     r.next_frame = next_frame_;
     r.body_steps = result_.body_steps;
     r.momentum = momentum_->largest();
-    r.spun = told_spun_;
+    r.spun = reported_spun_;
     r.wall_s = (from_ ? from_->wall_s : 0) + since_start_.seconds();
     return r;
 }
 
 void SimulateRecord::tell_spun(int body, std::uint64_t step) {
     spun_[std::size_t(body)] = true;
-    told_spun_.emplace_back(body, step);
+    reported_spun_.emplace_back(body, step);
     result_.mishaps.spun.push_back({name_of(scene_, body), step});
 }
 

@@ -74,8 +74,8 @@ private:
     std::optional<render::FrameState> reached_;  // the state before,
     double reached_s_ = 0;                       // and its time
     WorkerHistory history_;
-    std::vector<bool> spun_;  // of each body, that it was told
-    std::vector<std::pair<int, std::uint64_t>> told_spun_;
+    std::vector<bool> spun_;  // of each body: it was reported
+    std::vector<std::pair<int, std::uint64_t>> reported_spun_;
     std::uint64_t next_frame_ = 0, saved_frames_ = 0;
     Checkpoint run_;
     const RecordState* from_;  // of run_, where it goes on

@@ -57,7 +57,7 @@ struct AccuracyReport {
 ///
 /// Estimates leave out bumps and what a contact's error does to the next contacts. Bodies that events add are chosen
 /// for like the others. Trials run in this process, of the whole time, one after another: three to seven, about three
-/// times the cost of the run itself, and 0.15 s for each shape and material. Deterministic. `progress` hears of
+/// times the cost of the run itself, and 0.15 s for each shape and material. Deterministic. `progress` gets
 /// each trial's share done. Throws as run_alone.
 AccuracyReport keep_accuracy(WorldScene& scene, const AccuracyRequest& request,
                              const std::function<void(double)>& progress = {});

@@ -91,9 +91,9 @@ struct DistributedResult {
     std::uint64_t refused_messages = 0;                         ///< malformed or stale ones
     int largest_lead = 0, largest_ghost_age = 0;                ///< [steps]
     Eigen::Vector3d outside_impulse = Eigen::Vector3d::Zero();  ///< see World::outside_impulse
-    WorldCounts counts;                                         ///< summed over workers
-    std::vector<QuarantinedBody> quarantined;                   ///< in order of steps; so are the next two
-    std::vector<FirstStep> limited, broken;                     ///< see World::limited and World::broken
+    WorldCounts counts;                        ///< of one process; with workers the steps alone
+    std::vector<QuarantinedBody> quarantined;  ///< in order of steps; so are the next two
+    std::vector<FirstStep> limited, broken;    ///< see World::limited and World::broken
     bool one_owner = false;     ///< one worker owned all bodies, as they are too unlike to be shared out
     bool rest_reached = false;  ///< until_rest: every body came to rest
 };
@@ -168,7 +168,8 @@ void make_keys(const std::filesystem::path& folder, const std::vector<std::strin
 /// The process of a worker: joins the application at `endpoint`, which runs a world or a play, and serves
 /// until the run ends. At SIGTERM or SIGINT it sells its bodies and leaves. `key`: a file made by make_keys;
 /// empty: none. `threads` share out the steps of a world (World::use_threads). Returns the exit status.
-/// Throws InputError for an endpoint or key that is refused, WorkerError if nobody answers.
+/// If nobody answers, or the run fails, a line goes to standard error. Throws InputError for an endpoint or key that
+/// is refused.
 [[nodiscard]] int run_worker(const std::string& endpoint, const std::filesystem::path& key = {},
                              int threads = 1);
 

@@ -87,7 +87,7 @@ struct WorldCounts {
     std::uint64_t held_apart = 0;    ///< bodies held where they met, as those rounds did not suffice
 };
 
-/// What a world has told of its past; no step depends on it.
+/// What a world reports of its past; no step depends on it.
 struct WorldPast {
     WorldCounts counts;
     std::vector<QuarantinedBody> quarantined;

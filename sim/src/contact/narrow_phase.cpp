@@ -122,7 +122,7 @@ void NarrowPhase::pair(const PosedBody& a, const PosedBody& b, const PairSearch&
     fill(size, search.before, search.may_part, manifold);
 }
 
-// Adds the nearest points if they are within the margin; whether the distance could be told at all.
+// Adds the nearest points if they are within the margin; whether there is a distance at all.
 bool NarrowPhase::nearest(const PosedBody& a, const PosedBody& b, float margin) {
     const ConvexBody of_a(a), of_b(b);
     const ConvexDistance d =

@@ -43,7 +43,7 @@ struct ContactScene {
 ///
 /// A fast pair that carries no load has its time of impact on the paths of free motion (time_of_impact.h), unless it is in each
 /// other as the step begins, and had a contact a step ago or was put there (meet_fast): none, no contact; else its contact is found
-/// where the bodies are then, as one that begins at that time (IslandSolver: impacts). Of a body's impacts those later than a substep after its first are left to
+/// where the bodies are then, as one that begins at that time (Impacts). Of a body's impacts those later than a substep after its first are left to
 /// unforeseen(), which runs after the islands have been solved: it follows the paths really taken of bodies
 /// that left the foreseen ones, or touch and turn, and adds the contacts that they lead to. A pair that touches
 /// already meets again where it is kInside deep in each other, a little deeper every time.

@@ -60,10 +60,10 @@ void fields(auto& archive, Is<Handover> auto& m) {
 }
 
 /// From the application: these bodies belong to a structure (shared/structures.h) of which another worker has
-/// most, or their owner leaves: it offers them to that one. To the application: there is no other, it hands
-/// over what it has.
+/// most, or their owner leaves: it offers them to `to`. `to` kApplication: nobody else stays, so it hands over
+/// what it has.
 struct Gather {
-    static constexpr const char* kRoute = "application to one worker, and back";
+    static constexpr const char* kRoute = "application to one worker";
     std::uint32_t to = 0;
     std::vector<std::uint32_t> bodies;
 };

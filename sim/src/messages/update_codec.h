@@ -42,7 +42,7 @@ struct Update {
     bool held = false;    ///< whether `impulse` is there
     StepImpulse impulse;  ///< from the owner's other bodies, the mean of a step; linear, angular, modal
 };
-/// Updates as bytes: of those that one worker tells another few are needed soon, and those are read then.
+/// Updates as bytes: of those that one worker sends another few are needed soon, and those are read then.
 class PackedUpdates {
 public:
     struct Place {

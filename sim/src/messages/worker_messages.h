@@ -128,8 +128,7 @@ struct EndOfRun {
 struct Members {
     static constexpr const char* kRoute = "application to all workers";
     std::vector<std::uint32_t> workers;
-    /// Owners of some bodies are told next, then this message comes again without the flag. Until then nobody
-    /// steps.
+    /// Owners of some bodies follow, then this message again without the flag. Until then nobody steps.
     bool owners_follow = false;
 };
 void fields(auto& archive, Is<Members> auto& m) {
@@ -154,8 +153,7 @@ struct Ownership {
     bool traded = false;                ///< to a buyer; else at the start, or after a loss
     std::uint64_t step = 0;
     std::vector<WorldRecord> bodies;  ///< exact; without a handover as last published
-    /// To the owner alone, which was not told of what is here before: others' bodies near these, as last
-    /// published.
+    /// To the owner alone, to which nobody sent them so far: others' bodies near these, as last published.
     std::vector<WorldRecord> around = {};
     std::vector<std::uint64_t> around_step = {};  ///< of each
 };
@@ -224,15 +222,15 @@ void fields(Archive& archive, Is<Reach> auto& r) {
 }
 
 /// After each step to each other worker: what the receiver needs of it. Bodies that it does not name are not
-/// near the receiver's, unless they sleep and it was told so.
+/// near the receiver's, unless they sleep and an earlier message said so.
 struct NeighbourMessage {
     static constexpr const char* kRoute = "worker to worker";
     std::uint32_t to = 0;
-    std::uint64_t heard = 0;  ///< step of the receiver's last message that the sender has heard
-    float smoothed_s = 0;     ///< see WorkerStep
-    std::uint32_t own = 0;    ///< number of the sender's bodies
-    Reach reach;              ///< of these
-    PackedUpdates bodies;     ///< ascending
+    std::uint64_t acknowledged = 0;  ///< step of the receiver's last message that has reached the sender
+    float smoothed_s = 0;            ///< see WorkerStep
+    std::uint32_t own = 0;           ///< number of the sender's bodies
+    Reach reach;                     ///< of these
+    PackedUpdates bodies;            ///< ascending
     /// Of own bodies with the receiver's in the last step, as floats; ascending.
     std::vector<CrossImpulse> crossed;
     std::vector<std::uint32_t> broken;  ///< constraints that broke in the step
@@ -251,8 +249,8 @@ void fields(Archive& archive, Is<NeighbourMessage> auto& m) {
     bool bodies = !m.bodies.places().empty(), crossed = !m.crossed.empty(), broken = !m.broken.empty(),
          places = !m.places.empty();
     archive("bodies,crossed,broken,places", Bits{bodies, crossed, broken, places});  // which lists follow
-    archive("to heard smoothed_s own reach", m.to, m.heard, Within{m.smoothed_s, 0, kLongestTime_s}, m.own,
-            m.reach);
+    archive("to acknowledged smoothed_s own reach", m.to, m.acknowledged,
+            Within{m.smoothed_s, 0, kLongestTime_s}, m.own, m.reach);
     if constexpr (Archive::kReads) m.bodies.clear(), m.crossed.clear(), m.broken.clear(), m.places.clear();
     if (bodies) archive("bodies", Packed{m.bodies});
     if (crossed) archive("crossed", Packed{m.crossed});

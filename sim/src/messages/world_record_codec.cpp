@@ -1,7 +1,5 @@
 #include "messages/world_record_codec.h"
 
-#include <cmath>
-
 #include "body/body_kind.h"
 #include "bytes/archives.h"
 

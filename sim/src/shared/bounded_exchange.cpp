@@ -311,7 +311,7 @@ void BoundedExchange::send_borders(const StepReport& report) {
 
 void BoundedExchange::send_border(std::uint32_t worker) {
     auto& message = std::get<NeighbourMessage>(to_neighbour_);
-    message.to = worker, message.heard = peer(worker).message_step;
+    message.to = worker, message.acknowledged = peer(worker).message_step;
     message.bodies.clear();
     for (const std::size_t which : border_.select(worker, step_)) {
         OwnBody& own = own_bodies_[which];

@@ -82,6 +82,7 @@ std::uint32_t Coordinator::join(const JoinRequest& request) {
     send({worker}, SceneMessage{worker, scene_, settings_});
     observer_->note(name(worker) + " joins" + (request.host.empty() ? "" : " from " + request.host));
     members_.push_back(worker);
+    most_members_ = std::max(most_members_, members_.size());
     result_.workers = std::max(result_.workers, static_cast<int>(members_.size()));
     if (finished_) {
         send({worker}, EndOfRun{});

@@ -154,6 +154,7 @@ private:
     std::vector<Body> bodies_;
     std::vector<std::uint32_t> gone_;  // removed members whose messages are still stored
     std::vector<std::uint32_t> members_;
+    std::size_t most_members_ = 0;     ///< at any time
     std::set<std::uint32_t> leaving_;  // members that want to leave
     std::map<std::uint32_t, Sender> senders_;
     std::uint32_t next_worker_ = 0, epoch_ = 0;

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "shared/coordinator.h"
@@ -21,14 +20,14 @@ void Coordinator::expel(std::uint32_t worker, const std::string& why) {
 }
 
 // While the view is at one step, a member does at most `bound` + 1 steps. In each it sends border data to
-// each other member, and makes or answers an offer for each step of each member. This bounds what is relayed.
+// each other member of then, and makes or answers an offer for each step of each member. This bounds what is relayed.
 bool Coordinator::is_too_much(Sender& sender, std::size_t bytes) const {
     constexpr std::size_t kMessages = 256, kRepeated = 8;
     const auto steps = static_cast<std::size_t>(settings_.bound) + 2;
     if (std::exchange(sender.counted_at, view_.step()) != view_.step())
         sender.messages = sender.message_bytes = sender.offers = 0;
     sender.message_bytes += bytes;
-    return ++sender.messages > kMessages + 8 * steps * members_.size() + sender.offers ||
+    return ++sender.messages > kMessages + 8 * steps * most_members_ + sender.offers ||
            sender.message_bytes > kRepeated * steps * static_cast<std::size_t>(largest_message(scene_));
 }
 
@@ -81,7 +80,7 @@ void Coordinator::handle(const MessageHeader& header, std::span<const std::uint8
         ++result_.left;
         return remove(worker);
     }
-    refuse(worker, "found a message that no worker sends, expected one of a worker");
+    expel(worker, "found a message that no worker sends");
 }
 
 void Coordinator::handle_offer(const MessageHeader& header, std::span<const std::uint8_t> bytes,

@@ -94,7 +94,7 @@ void ForeignBodies::receive(std::uint32_t worker, std::uint64_t step, NeighbourM
     ReceivedStep* received = slot(worker, step);
     if (!received) return;
     add_found(worker, {step, std::move(message.crossed)});
-    received->complete = true, received->acknowledged = message.heard;
+    received->complete = true, received->acknowledged = message.acknowledged;
     const std::vector<PackedUpdates::Place>& bodies = message.bodies.places();
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         const PackedUpdates::Place& place = bodies[i];

@@ -1,7 +1,6 @@
 #include "shared/market.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>

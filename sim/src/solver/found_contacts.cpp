@@ -1,7 +1,6 @@
 #include "solver/found_contacts.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace sim {
 namespace {

@@ -45,7 +45,6 @@ public:
         return std::exchange(rows_.outside, Eigen::Vector3d::Zero());
     }
     [[nodiscard]] CrossImpulses& cross() noexcept { return rows_.cross; }
-    [[nodiscard]] const CrossImpulses& cross() const noexcept { return rows_.cross; }
     [[nodiscard]] std::uint64_t deformations_limited() const noexcept {
         return rows_.limited;
     }                                                                                    ///< since the start

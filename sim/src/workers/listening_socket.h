@@ -15,7 +15,6 @@ public:
 
     /// Stops or accepts new connections as descriptors become few or free. To be called often.
     void update() noexcept;
-    [[nodiscard]] bool closed() const noexcept { return closed_; }
 
 private:
     int descriptor_ = -1;  ///< ZeroMQ's own; -1: not known

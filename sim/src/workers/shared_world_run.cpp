@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <csignal>
 #include <optional>
 #include <utility>
 
@@ -30,7 +28,7 @@ std::string seconds(double s) {
 /// A worker in this process, for when no other is left.
 class WorkerHere {
 public:
-    WorkerHere(std::uint32_t number) : number_(number) {}
+    explicit WorkerHere(std::uint32_t number) : number_(number) {}
     [[nodiscard]] std::uint32_t number() const { return number_; }
 
     void receive(const std::vector<std::uint8_t>& bytes) {

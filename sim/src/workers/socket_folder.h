@@ -14,7 +14,6 @@ public:
     SocketFolder& operator=(const SocketFolder&) = delete;
 
     [[nodiscard]] std::string endpoint() const { return "ipc://" + path_ + "/workers"; }
-    [[nodiscard]] const std::string& path() const { return path_; }
 
 private:
     std::string path_;

@@ -1,6 +1,5 @@
 #pragma once
 #include <chrono>
-#include <string>
 #include <vector>
 
 #include "workers/worker_gate.h"

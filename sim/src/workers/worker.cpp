@@ -123,7 +123,12 @@ int serve(zmq::socket_t& socket, Heartbeat& heartbeat, int threads, DecodedMessa
     if (std::holds_alternative<StruckAssign>(first.message)) {
         heartbeat.joined(first.header.worker);
         stop_listening_for_leave();
-        return KitWorker(socket, heartbeat).serve(std::move(first));
+        try {
+            return KitWorker(socket, heartbeat).serve(std::move(first));
+        } catch (const DecodeError& e) {
+            send(socket, encode({}, WorkerFailure{e.what()}));
+            throw;
+        }
     }
     if (const auto* refusal = std::get_if<Refusal>(&first.message))
         std::fprintf(stderr, "worker: refused: %s\n", refusal->why.c_str());
@@ -147,12 +152,7 @@ int serve(zmq::context_t& context, const std::string& endpoint, const std::optio
     zmq::message_t frame;
     int status = 1;
     if (wait_for_answer(socket, heartbeat, frame)) {
-        try {
-            status = serve(socket, heartbeat, threads, decode_message(bytes_of(frame)));
-        } catch (const DecodeError& e) {
-            send(socket, encode({}, WorkerFailure{e.what()}));
-            throw WorkerError(std::string("bad message: ") + e.what());
-        }
+        status = serve(socket, heartbeat, threads, decode_message(bytes_of(frame)));
     } else if (leave_asked()) {
         stop_listening_for_leave();
     } else if (!heartbeat.application_gone()) {

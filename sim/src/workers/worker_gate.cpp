@@ -27,15 +27,15 @@ constexpr double kMostJoinsAtOnce = 256, kJoinsPerSecond = 4;
 constexpr int kReceivedAhead = 200;  // messages of a connection that wait in the socket
 constexpr auto kHandshakeWithin = 5s;
 
-enum class Type : std::uint16_t { join = 1, beat = 2 };
+constexpr std::uint16_t kBeat = 2;
 
 bool is_ours(const zmq::message_t& frame) {
     return frame.size() >= 12 && frame.to_string_view().starts_with("MWSW");
 }
-bool is(const zmq::message_t& frame, Type type) {
+bool is_beat(const zmq::message_t& frame) {
     std::uint16_t found = 0;
     if (is_ours(frame)) std::memcpy(&found, frame.data<std::uint8_t>() + 6, sizeof found);
-    return found == static_cast<std::uint16_t>(type);
+    return found == kBeat;
 }
 
 DecodedMessage decoded(const zmq::message_t& frame) {
@@ -220,7 +220,7 @@ void WorkerGate::receive() {
 }
 
 void WorkerGate::handle(std::string&& identity, const zmq::message_t& frame) {
-    if (is(frame, Type::beat)) return handle_beat(identity, frame);
+    if (is_beat(frame)) return handle_beat(identity, frame);
     const auto known = numbers_.find(identity);
     if (known == numbers_.end()) return handle_stranger(std::move(identity), frame);
     Member& member = members_.at(known->second);

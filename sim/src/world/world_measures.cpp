@@ -1,5 +1,4 @@
 #include <bit>
-#include <cmath>
 
 #include "world/world_implementation.h"
 

@@ -93,7 +93,7 @@ void World::rewind(const WorldSnapshot& snapshot) {
     for (const ContactRecord& record : snapshot.contacts)
         w.contacts.manifolds().push_back(manifold_of(record));
     w.restore(snapshot.springs);
-    const auto undone = [&](const auto& told) { return told.step > snapshot.step; };
+    const auto undone = [&](const auto& event) { return event.step > snapshot.step; };
     std::erase_if(w.quarantined, undone);
     std::erase_if(w.broken, undone);
     for (const FirstStep& first : w.limited)

@@ -48,7 +48,8 @@ TEST(StruckMessages, TwentyThousandMutationsAreRefusedOrDecodeToSomethingThatEnc
     for (int i = 0; i < 20000; ++i) {
         std::vector<std::uint8_t> bytes = sim::encode({}, messages[rng() % messages.size()]);
         bytes = damaged(std::move(bytes), rng);
-        if (i % 4) sim_test::seal(bytes);  // mostly past the checksum, so that the fields' own checks are met
+        if (i % 4)
+            sim_test::seal(bytes);  // mostly of the right length, so that the fields' own checks are met
         try {
             const sim::DecodedMessage back = sim::decode_message(bytes);
             EXPECT_EQ(sim::encode(back.header, back.message), bytes);

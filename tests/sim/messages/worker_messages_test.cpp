@@ -105,7 +105,7 @@ std::vector<sim::WorkerMessage> world_samples() {
     settings.bound = 4, settings.steps = 500;
     const std::vector<sim::FoundStep> found = {{75, {crossed(rng, 4, 7, false)}}, {76, {}}};
     sim::NeighbourMessage neighbour;
-    neighbour.to = 2, neighbour.heard = 97, neighbour.smoothed_s = 0.001f, neighbour.own = 3;
+    neighbour.to = 2, neighbour.acknowledged = 97, neighbour.smoothed_s = 0.001f, neighbour.own = 3;
     neighbour.reach = {{Eigen::Vector3f(-1, 0, 2), Eigen::Vector3f(3, 1, 5)}, 0xff00ff, 2.5f};
     for (const bool held : {true, false}) neighbour.bodies.add(update(rng, 12, held));
     neighbour.crossed = {crossed(rng, 4, 7, false)}, neighbour.broken = {1};

@@ -118,7 +118,7 @@ struct Three {
 };
 
 // It publishes its steps, and so is not the slowest.
-TEST(Silence, WhoTellsOneOtherNothingIsGivenUpAndNotThatOne) {
+TEST(Silence, WhoSendsOneOtherNothingIsGivenUpAndNotThatOne) {
     for (const std::uint32_t silent : {0u, 1u, 2u}) {
         Three three;
         int turns = 0;

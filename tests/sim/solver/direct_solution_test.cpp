@@ -3,22 +3,20 @@
 
 #include <gtest/gtest.h>
 
-#include <numbers>
-
 #include "solver_island.h"
 
 namespace {
 
 using namespace world_test;
 
-/// A chain of balls that hangs from a place at the origin.
+/// A chain of balls that hangs from a place in the world.
 sim::WorldDefinition chain(int count, double stiffness) {
     sim::WorldDefinition world;
     for (int i = 0; i < count; ++i) {
         world.bodies.push_back(ball({0.3 * (i + 1), 0, 0}, sim::Fidelity::rigid, 0.1, 1000));
         sim::PointConstraint c;
         c.body_a = i, c.point_a = {-0.15, 0, 0};
-        c.body_b = i - 1, c.point_b = i > 0 ? Eigen::Vector3d(0.15, 0, 0) : Eigen::Vector3d(0.15, 0, 0);
+        c.body_b = i - 1, c.point_b = {0.15, 0, 0};
         c.stiffness = stiffness, c.collide = false;
         world.constraints.push_back(c);
     }

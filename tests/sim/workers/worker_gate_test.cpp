@@ -86,7 +86,7 @@ void join(sim::WorkerGate& gate, Peer& peer, std::uint32_t worker, const sim::Se
     ASSERT_TRUE(gets<sim::Members>(peer));
 }
 
-TEST(WorkerGate, AMemberIsHeardAndReachedByItsNumberAndOverTcpToo) {
+TEST(WorkerGate, AMemberSendsAndIsReachedByItsNumberAndOverTcpToo) {
     sim::WorkerGate gate({"tcp://127.0.0.1:*", {}, 60});
     Peer near(gate.private_endpoint()), far(gate.endpoint());
     join(gate, near, 3);
