@@ -110,7 +110,7 @@ Reads read_while_writing(const char* what, std::chrono::microseconds period) {
     while (!memory.newest().read()) sched_yield();
     Reads reads;
 #ifdef MUSICWORLD_SANITIZED
-    constexpr std::int64_t kShort = 2'000'000;  // half a minute
+    constexpr std::int64_t kShort = 500'000;  // some twenty seconds
 #else
     constexpr std::int64_t kShort = 10'000'000;
 #endif
