@@ -38,9 +38,10 @@ void print_workers(const SimulateResult& r) {
 
 void print(const SimulateResult& r, const SimulateOptions& options) {
     fmt::print(
-        "{}: {} ({} rigid, {} linear, {} modal), {} of {:.6g} s in {:.3g} s: {:.2f} us per body and step\n",
+        "{}: {} ({} rigid, {} linear, {} modal), {} of {:.6g} s in {:.3g} {}: {:.2f} us per body and step\n",
         r.name, counted(r.bodies, "body"), r.rigid, r.linear, r.modal, counted(r.steps, "step"), r.dt_s,
-        r.elapsed_s, r.body_steps > 0 ? 1e6 * r.elapsed_s / double(r.body_steps) : 0.0);
+        r.elapsed_s, r.worker_options && r.worker_options->simulated ? "simulated s" : "s",
+        r.body_steps > 0 ? 1e6 * r.elapsed_s / double(r.body_steps) : 0.0);
     fmt::print("energy {:.6g} J at first, {:.6g} J at last; ", r.energy_start.total(), r.energy.total());
     if (!r.worker_options) fmt::print("{} asleep; ", r.counts.asleep);
     fmt::print("state {:016x}\n", r.state_hash);
