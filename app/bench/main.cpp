@@ -168,7 +168,8 @@ const std::vector<Bench> kBenches = {
     {"tradeoff", "two minutes", {"tradeoff.json", "tradeoff.csv", "tradeoff.svg"}, bench_the_tradeoff}};
 
 Figures run_bench(const Bench& bench, const BenchOptions& options, const std::string& out, const Show& show) {
-    say(fmt::format("bench {}: about {} on two cores, less where options leave parts out", bench.name, bench.length));
+    say(fmt::format("bench {}: about {} on two cores, less where options leave parts out", bench.name,
+                    bench.length));
     // Opened before the minutes of measuring, so that a place that cannot be written is known at once.
     std::optional<OutputFolder> folder;
     if (!out.empty()) folder.emplace(out, bench.products);
